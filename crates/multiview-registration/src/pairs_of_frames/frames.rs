@@ -11,9 +11,9 @@ use crate::error::{Error, Result};
 use crate::pairs_of_frames::frame_graph::FrameGraph;
 use crate::pairs_of_frames::frame_pairs::{Candidate, FramePair, Frames, Guess};
 use crate::pairs_of_frames::frame_scale::scaled;
+use crate::relative_pose::check_poses;
 use crate::survey::registration::Start;
 use projective_registration::{Agreement, FrameAlignmentOptions, OrganisedFrame, SharedError};
-use rigid_pose::is_finite;
 
 /// Share of a frame that another must be expected to see for the two to be aligned.
 const LEAST_OVERLAP: f64 = 0.3;
@@ -101,10 +101,7 @@ pub fn register_frames(
         return Err(Error::Empty { what: "the list of frames" });
     }
     if let Start::Poses(poses) = start {
-        crate::relative_pose::require_poses(frames.len(), poses)?;
-        if let Some(index) = poses.iter().position(|pose| !is_finite(pose)) {
-            return Err(Error::NonFinite { what: "poses of the frames", index });
-        }
+        check_poses("poses of the frames", frames.len(), poses)?;
     }
     let mut survey = Survey::new(frames, start, options);
     let graph = survey.run(progress)?;

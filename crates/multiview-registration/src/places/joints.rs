@@ -94,7 +94,7 @@ impl Places<'_> {
 
     /// The pairs that hold all stations best, weakest first.
     fn tree(&self) -> Result<Vec<Weakest>> {
-        let joint = JointCovariance::new(self.adjusted.cofactors.clone(), self.adjusted.variance_factor());
+        let joint = JointCovariance::new(self.adjusted.cofactors.clone(), self.adjusted.factor);
         let all: Vec<[usize; 2]> = pairs(self.adjusted).collect();
         let mut all: Vec<Weakest> =
             all.par_iter().map(|ends| Weakest::new(self, &joint, *ends)).collect::<Result<_>>()?;

@@ -10,8 +10,9 @@ use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
 use crate::adjustment::joints::Joint;
+use crate::adjustment::known::Known;
 use crate::adjustment::network::Network;
-use crate::adjustment::rounds::{FEWEST_CONTACTS, KNOWN, Known};
+use crate::adjustment::rounds::FEWEST_CONTACTS;
 use crate::adjustment::simultaneous::Adjusted;
 use crate::error::Result;
 use crate::places::sought::Sought;
@@ -19,7 +20,6 @@ use crate::planes::sightings::{Gate, NOWHERE, Sighting, Wide, members};
 use crate::planes::sums::Sums;
 use crate::surfaces::extents::Extent;
 use crate::surfaces::points::{Block, StationPoints};
-use icp_registration::RobustKernel;
 
 /// Points of a station that make a tile one that it saw.
 const FEWEST_POINTS: usize = 5;
@@ -57,9 +57,8 @@ impl<'a> Places<'a> {
     ) -> Self {
         let planes = &adjusted.shared_planes;
         let (wide, members) = (Wide::new(planes), members(points.len(), planes));
-        let [least, most] = [KNOWN * size_m, reach_m].map(|length_m| Known::at(length_m, network.hold_m));
-        let known_m = Known::estimated(start, &adjusted.state.poses, least, most).position_m;
-        let gate = Gate { kernel: RobustKernel::Tukey, slack_m: 0.0, stride: 1, parameters: 0 };
+        let known_m = Known::estimated(start, &adjusted.state.poses, (size_m, reach_m), network.hold_m).position_m;
+        let gate = Gate { slack_m: 0.0, stride: 1, parameters: 0 };
         let look = |station: usize| {
             let (points, pose) = (&points[station], &adjusted.state.poses[station]);
             let free_to = |(point, sigma): (&Point3<f64>, &f64)| (*point, point.coords.norm() - BEFORE * sigma);

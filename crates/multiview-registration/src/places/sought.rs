@@ -9,7 +9,6 @@ use crate::places::search::Places;
 use crate::planes::elimination::motion_of;
 use crate::planes::sightings::{Gate, NOWHERE, Sighting, Wide};
 use crate::surfaces::points::StationPoints;
-use icp_registration::RobustKernel;
 use rigid_pose::eigen6;
 
 /// Steps of a slide, patches.
@@ -107,7 +106,7 @@ impl<'a> Sought<'a> {
         let of_others = |plane: usize| planes[plane].tiles.numbers().any(by_others);
         let wide = places.wide.within(&places.around(station, &pose), of_others);
         let mut points = places.points[station].clone();
-        let gate = Gate { kernel: RobustKernel::Tukey, slack_m: 0.0, stride: 1, parameters: 0 };
+        let gate = Gate { slack_m: 0.0, stride: 1, parameters: 0 };
         let sighting = Sighting::new(&points, &pose, planes, gate);
         let (_, tiles) = sighting.sums_and_tiles(&wide, &places.members[station]);
         for (sigma, tile) in points.sigma.iter_mut().zip(tiles) {
@@ -189,7 +188,7 @@ impl<'a> Sought<'a> {
     /// The points of the station moved so, which may be off by some length.
     fn at(&self, motion: &Isometry3<f64>, slack_m: f64, stride: usize) -> Place {
         let planes = &self.places.adjusted.shared_planes;
-        let gate = Gate { kernel: RobustKernel::Tukey, slack_m, stride, parameters: 0 };
+        let gate = Gate { slack_m, stride, parameters: 0 };
         let pose = motion * self.pose;
         let sums =
             Sighting::new(&self.points, &pose, planes, gate).sums(&self.wide, &self.places.members[self.station]);

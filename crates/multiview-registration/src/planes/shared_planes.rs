@@ -8,6 +8,7 @@ use crate::planes::contacts::Contact;
 use crate::planes::reduction::PairContacts;
 use crate::planes::tiles::Tiles;
 use crate::surfaces::extents::{Extent, Extents};
+use crate::surfaces::grouping::cell;
 use crate::surfaces::patches::{Surface, axes};
 use crate::surfaces::plane_fit::{Moments, SAME_DIRECTION};
 use crate::surfaces::regions::{OFF_PLANE, ROUGHER};
@@ -327,10 +328,6 @@ impl Piece {
             column.any(|(_, other)| (centre - self.centres[*other as usize]).norm() <= self.reach_m)
         })
     }
-}
-
-fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
-    <[f64; 3]>::from(point.coords).map(|x| (x / size_m).floor() as i64)
 }
 
 /// Both ends of all contacts, as stations and patches.

@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use icp_registration::{RobustKernel, TUKEY};
+use crate::planes::sightings::KERNEL;
+use icp_registration::TUKEY;
 
 /// Fewest degrees of freedom that tell how much noise derivatives share with distances.
 const FEWEST_FREE: f64 = 5.0;
@@ -62,11 +63,11 @@ impl Sums {
     /// left so, the noise of all points would shrink the scene. Within a tile derivatives are linear in `[u, v]`; the sums
     /// become those of the lines fitted to them, less what the noise leaves in the fit, which the scatter about the lines
     /// tells.
-    pub(crate) fn free_derivatives_of_noise(&mut self, kernel: RobustKernel) {
+    pub(crate) fn free_derivatives_of_noise(&mut self) {
         if self.order == 3 {
             return;
         }
-        let (stride, share) = (Self::stride(self.order), share_of_fit(kernel));
+        let (stride, share) = (Self::stride(self.order), share_of_fit());
         for own in self.values.chunks_exact_mut(stride) {
             if !freed_of_noise(own, self.order, share) {
                 own.fill(0.0);
@@ -115,13 +116,13 @@ impl Sums {
 }
 
 /// What a fitted number keeps of the noise, over what a degree of freedom leaves of it: `E[w² x²] / (E[w] E[w x²])` of
-/// normal deviations x, one without a robust kernel.
-fn share_of_fit(kernel: RobustKernel) -> f64 {
+/// normal deviations x; it would be one without a robust kernel.
+fn share_of_fit() -> f64 {
     let (mut all, mut weights, mut left, mut kept) = (0.0, 0.0, 0.0, 0.0);
     for step in -500..=500 {
         let x = f64::from(step) / 100.0;
         let density = (-0.5 * x * x).exp();
-        let weight = if x.abs() > TUKEY { 0.0 } else { kernel.weight(x) };
+        let weight = if x.abs() > TUKEY { 0.0 } else { KERNEL.weight(x) };
         all += density;
         weights += density * weight;
         left += density * weight * x * x;

@@ -48,10 +48,7 @@ fn scatter(cloud: &Cloud, normals: &[Vector3<f64>], size_m: f64) -> f64 {
     let mut found: Vec<(f64, usize)> = Vec::new();
     for points in group(cloud, normals, size_m).iter().filter(|points| points.len() >= FEWEST) {
         let origin = cloud.points[points[0] as usize].coords;
-        let mut moments = Moments::default();
-        for &i in points {
-            moments.add(&(cloud.points[i as usize].coords - origin));
-        }
+        let moments = Moments::of(&cloud.points, points, &origin);
         let count = moments.count();
         let variance = eigenvalues3(&moments.scatter())[0].max(0.0) * count / (count - 3.0);
         found.push((variance.sqrt(), points.len()));

@@ -83,10 +83,7 @@ impl Groups {
     fn fitted(&self, points: &[Point3<f64>], origin: &Vector3<f64>) -> (Self, Vec<(Moments, Plane)>) {
         let mut fits = Vec::with_capacity(self.starts.len());
         let kept = self.filtered(|_, own| {
-            let mut moments = Moments::default();
-            for &i in own {
-                moments.add(&(points[i as usize].coords - origin));
-            }
+            let moments = Moments::of(points, own, origin);
             let plane = moments.plane();
             fits.extend(plane.map(|plane| (moments, plane)));
             plane.is_some()
@@ -225,10 +222,7 @@ fn of_one_plane(cloud: &Cloud, normals: &[Vector3<f64>], mut points: Vec<u32>, r
     for _ in 0..2 {
         let Some(&first) = points.first() else { return points };
         let origin = cloud.points[first as usize].coords;
-        let mut moments = Moments::default();
-        for &i in &points {
-            moments.add(&(cloud.points[i as usize].coords - origin));
-        }
+        let moments = Moments::of(&cloud.points, &points, &origin);
         let Some(plane) = moments.plane() else { return points };
         let mean = moments.mean();
         let distance = |i: u32| plane.normal.dot(&(cloud.points[i as usize].coords - origin - mean)).abs();

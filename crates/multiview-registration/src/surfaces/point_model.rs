@@ -55,8 +55,11 @@ impl SharedParameters {
     }
 }
 
+/// Values and standard deviations of the shared parameters beforehand.
+pub(crate) type Prior = (Vec<f64>, Vec<f64>);
+
 /// Refuses a model whose lists differ in length or are not numbers, and returns the prior.
-pub(crate) fn checked_prior(model: &dyn PointModel) -> Result<(Vec<f64>, Vec<f64>)> {
+pub(crate) fn checked_prior(model: &dyn PointModel) -> Result<Prior> {
     let (values, sigma) = model.prior();
     let expected = model.names().len();
     for found in [values.len(), sigma.len()] {

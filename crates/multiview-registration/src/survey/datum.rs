@@ -55,7 +55,7 @@ impl Datum {
             turned.fixed_view_mut::<3, 3>(6 * k, 6 * k).copy_from(&turn);
         }
         let change = turned * change;
-        (centred, JointCovariance::of_whole(&change * cofactors * change.transpose(), poses.len()))
+        (centred, JointCovariance::of_whole(&change * cofactors * change.transpose()))
     }
 }
 

@@ -13,6 +13,7 @@ use crate::agreement::alignments::Overlap;
 use crate::agreement::loops::reached;
 use crate::agreement::placement::{Placements, judge_placements};
 use crate::error::{Error, Result};
+use crate::relative_pose::check_poses;
 use crate::surfaces::point_model::SharedParameters;
 use crate::surfaces::points::StationPoints;
 use crate::survey::check::{Checked, checked};
@@ -22,7 +23,6 @@ use crate::survey::registration::{
 };
 use crate::survey::together::{Brought, brought_together, is_whole, network, prior_of};
 use point_cloud::Cloud;
-use rigid_pose::is_finite;
 
 /// Most stations at once from approximate poses. In buildings of so many (see docs/benchmarks.md) all come into their places, or are
 /// named; of more that has not been shown.
@@ -42,7 +42,7 @@ const MOST_ARRANGED: usize = 200;
 /// # Errors
 /// [`Error::UnconnectedStations`] names stations that no pair leads to; [`Error::TooManyStations`]; [`Error::Empty`], [`Error::LengthMismatch`],
 /// [`Error::NonFinite`], [`Error::NotPositive`], [`Error::NoSuchStation`], [`Error::InvalidOption`] for the input;
-/// [`Error::Adjustment`] where shared parameters are not determined.
+/// [`Error::Numerical`] where shared parameters are not determined.
 pub fn register_stations(
     stations: &[Cloud],
     start: Start<'_>,
@@ -96,10 +96,7 @@ fn validate(
     }
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
     if let Start::Poses(poses) = start {
-        crate::relative_pose::require_poses(stations.len(), poses)?;
-        if let Some(index) = poses.iter().position(|pose| !is_finite(pose)) {
-            return Err(Error::NonFinite { what: "poses of the stations", index });
-        }
+        check_poses("poses of the stations", stations.len(), poses)?;
     }
     require_few(stations.len(), start, options)?;
     let (station, count) = (datum.held_station(), stations.len());
@@ -155,7 +152,7 @@ fn result(
     let count = adjusted.state.poses.len();
     let parameters = adjusted.state.parameters.len();
     let (redundancy, sigma0) = (adjusted.redundancy(), adjusted.sigma0());
-    let joint = JointCovariance::new(adjusted.cofactors.clone(), adjusted.variance_factor());
+    let joint = JointCovariance::new(adjusted.cofactors.clone(), adjusted.factor);
     let undetermined = undetermined(&adjusted.state.poses, &joint, network.hold_m, size_m);
     let surfaces = adjusted.overlaps(FEWEST_CONTACTS).iter().map(|overlap| surface_pair(&adjusted, overlap)).collect();
     let (poses, joint) = datum.apply(start, adjusted.state.poses, joint, network.hold_m);

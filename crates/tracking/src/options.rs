@@ -3,7 +3,6 @@
 use nalgebra::Isometry3;
 
 use crate::error::{Error, Result};
-use global_registration::CoarseOptions;
 use projective_registration::FrameAlignmentOptions;
 
 /// Whether keyframes learn from the frames tracked against them.
@@ -18,7 +17,7 @@ pub enum Fusion {
 }
 
 /// How the pose is sought after a loss.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Relocalisation {
     /// Only around the prediction, and from the poses of the keyframes that look most like the frame.
@@ -26,8 +25,6 @@ pub enum Relocalisation {
     /// Then also by alignment without a guess, with one keyframe a frame.
     #[default]
     Coarse,
-    /// The same with other options.
-    CoarseWith(Box<CoarseOptions>),
     /// As [`Coarse`](Self::Coarse), for streams that do not wait: a lost frame is registered with two keyframes, other ones each time,
     /// and the alignment without a guess goes on beside the frames, on a thread of its own. What it finds serves the tenth frame
     /// behind the one that was aligned, which waits for it, so that the same frames give the same bits.

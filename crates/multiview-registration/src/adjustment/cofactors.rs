@@ -38,7 +38,8 @@ impl Cofactors {
 
     /// Blocks of two stations that the factor holds.
     pub(crate) fn filled(&self) -> usize {
-        self.inverse.factor().filled()
+        // Parameters that are none have a block of their own.
+        self.inverse.factor().filled() - usize::from(self.parameters() == 0)
     }
 
     /// Of a station's pose.

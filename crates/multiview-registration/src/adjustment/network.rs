@@ -11,8 +11,9 @@ use crate::relative_pose::relative_pose_parts;
 use crate::surfaces::point_model::Prior;
 use rigid_pose::step_pose;
 
-/// Steps onto what pairs observe: relative poses bend with large turns, and contacts are found anew anyway.
-const RELATIVE_STEPS: usize = 2;
+/// Steps onto what pairs observe end below this part of the radius, or after so many: relative poses bend with large turns.
+const SMALL_STEP: f64 = 1e-6;
+const MOST_STEPS: usize = 6;
 
 /// Poses and shared parameters.
 #[derive(Debug, Clone)]
@@ -73,7 +74,7 @@ impl Network<'_> {
     ) -> Result<State> {
         let (mut now, parameters) = (state.clone(), state.parameters.len());
         let share = anchors.factor.max(1.0).sqrt().recip();
-        for _ in 0..RELATIVE_STEPS {
+        for _ in 0..MOST_STEPS {
             let mut equations = Equations::new(now.poses.len(), anchors.fixed, parameters, 0);
             let changed = DVector::from_fn(parameters, |k, _| now.parameters[k] - state.parameters[k]);
             for (pair_contacts, reduced) in pairs.iter().filter(|(_, reduced)| reduced.rows.nrows() > 0) {
@@ -91,7 +92,11 @@ impl Network<'_> {
             }
             equations.hold(anchors.known, anchors.poses, &now.poses);
             equations.add_prior(self.prior, &now.parameters);
+            let before = now.clone();
             now.moved(&equations.step(&equations.cofactors(anchors.known)?));
+            if largest_step(&before, &now, self.hold_m) <= SMALL_STEP * self.hold_m {
+                break;
+            }
         }
         Ok(now)
     }

@@ -321,9 +321,7 @@ fn motions(
         let motion = motion_of(shared_plane, &poses[station]).transpose() * step.fixed_rows::<6>(6 * station);
         motions.fixed_rows_mut::<3>(3 * k).copy_from(&motion);
     }
-    let (of_motions, of_poses) = (3 * eliminated.stations.len(), 6 * poses.len());
-    for k in of_motions..motions.len() {
-        motions[k] = step[of_poses + k - of_motions];
-    }
+    let shared = step.rows_range(6 * poses.len()..);
+    motions.rows_mut(3 * eliminated.stations.len(), shared.len()).copy_from(&shared);
     motions
 }

@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::error::Result;
 use crate::places::search::Places;
@@ -197,8 +197,8 @@ impl<'a> Sought<'a> {
             let Some(own) = sums.at(slot) else { continue };
             let plane = planes.partition_point(|plane| plane.tiles.first <= sums.tile(slot)) - 1;
             let motion = motion_of(&planes[plane], &pose);
-            normal += motion * Matrix3::from_fn(|i, j| own.product(i, j)) * motion.transpose();
-            right += motion * Vector3::from_fn(|i, _| own.right(i));
+            normal += motion * own.products(0, 0) * motion.transpose();
+            right += motion * own.rights(0);
             points += sums.count(slot);
         }
         let by = self.tangent(&pose);

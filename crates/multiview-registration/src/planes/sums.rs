@@ -110,7 +110,7 @@ impl Sums {
         let stride = Self::stride(self.order);
         let begin = self.begins.get(slot)?.1 as usize;
         let own = self.values.get(begin..begin + stride)?;
-        let (products, right) = own.split_at(stride - self.order - 1);
+        let (products, right) = own[..stride - 1].split_at(stride - self.order - 1);
         (own[0] > 0.0).then_some(TileSums { products, right })
     }
 }
@@ -192,6 +192,20 @@ impl TileSums<'_> {
 
     pub(crate) fn right(&self, row: usize) -> f64 {
         self.right[row]
+    }
+
+    /// Products of three by three; zero beyond the last.
+    pub(crate) fn products(&self, a: usize, b: usize) -> Matrix3<f64> {
+        let known = |row: usize| row < self.right.len();
+        Matrix3::from_fn(|i, j| {
+            let (row, column) = (3 * a + i, 3 * b + j);
+            if known(row) && known(column) { self.product(row, column) } else { 0.0 }
+        })
+    }
+
+    /// Three right sides; zero beyond the last.
+    pub(crate) fn rights(&self, a: usize) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| self.right.get(3 * a + i).copied().unwrap_or(0.0))
     }
 
     /// Sum of the weights.

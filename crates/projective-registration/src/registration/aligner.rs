@@ -199,7 +199,7 @@ impl FrameAligner {
     /// What the pairs of some nodes say about the pose.
     pub(crate) fn verdict(&mut self, track: &Track, frames: Frames<'_>, blocks: &[Block]) -> Result<Verdict> {
         let (moved, frame) = frames.moved(track);
-        let limit_m = self.options.max_motion_sigma_m.unwrap_or(frame.radius_m / 300.0);
+        let limit_m = self.options.max_motion_sigma_m.unwrap_or(FrameAlignmentOptions::OPEN * frame.radius_m);
         Verdict::new(&moved, &track.rules, blocks, limit_m, &mut self.cells)
     }
 

@@ -1,22 +1,19 @@
 use crate::error::{Error, Result};
 
-/// Edge of a voxel, metre: that of crate `fusion`. Smaller, and shapes are kept finer, in more points, each averaged over less.
-const VOXEL_M: f64 = 0.05;
-/// Points of a map. Each takes some 130 bytes, so the map stays below 130 MB; in voxels of 0.05 m they are 2,500 m² of walls.
-const MOST_POINTS: usize = 1_000_000;
-
 /// How fine a [`SurfaceMap`](crate::SurfaceMap) is, and how large it may become.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapOptions {
-    /// Edge of a voxel, metre. Default: 0.05.
+    /// Edge of a voxel, metre. Smaller, and shapes are kept finer, in more points, each averaged over less. Default: 0.05, that of crate
+    /// `fusion`.
     pub voxel_m: f64,
-    /// Most points. A map that would have more doubles its voxels and goes on. Default: 1,000,000, below 130 MB.
+    /// Most points. A map that would have more doubles its voxels and goes on. Default: 1,000,000 of some 130 bytes each: below 130 MB, and
+    /// 2,500 m² of walls in voxels of 0.05 m.
     pub most_points: usize,
 }
 
 impl Default for MapOptions {
     fn default() -> Self {
-        Self { voxel_m: VOXEL_M, most_points: MOST_POINTS }
+        Self { voxel_m: 0.05, most_points: 1_000_000 }
     }
 }
 

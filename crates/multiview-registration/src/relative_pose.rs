@@ -4,7 +4,7 @@ use adjust::{EvaluationFailure, RigidPose};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::error::{Error, Result};
-use rigid_pose::pose_difference;
+use rigid_pose::{InputError, pose_difference, require_length};
 
 /// Residual, and Jacobians by target and source.
 type RelativeParts = (Vector6<f64>, Matrix6<f64>, Matrix6<f64>);
@@ -50,12 +50,9 @@ fn inverse_left_jacobian(v: &Vector3<f64>) -> Matrix3<f64> {
 
 pub(super) fn require_poses(stations: usize, poses: &[Isometry3<f64>]) -> Result<()> {
     if stations == 0 {
-        return Err(Error::Empty { what: "the list of stations" });
+        return Err(InputError::Empty { what: "the list of stations" }.into());
     }
-    if poses.len() != stations {
-        return Err(Error::LengthMismatch { what: "poses of the stations", expected: stations, found: poses.len() });
-    }
-    Ok(())
+    Ok(require_length("poses of the stations", stations, poses.len())?)
 }
 
 #[allow(clippy::needless_pass_by_value)] // the form that map_err takes

@@ -1,8 +1,9 @@
 //! What can be chosen in the registration of frames.
 
 use nalgebra::Matrix6;
+use rigid_pose::{InputError, require_count, require_option, require_positive};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::shared_error::SharedError;
 use icp_registration::DegeneracyPolicy;
 
@@ -71,43 +72,21 @@ impl Default for FrameAlignmentOptions {
 
 impl FrameAlignmentOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        let positive = [
-            ("max_motion_sigma_m", self.max_motion_sigma_m),
-            ("step_tolerance_m", self.step_tolerance_m),
-            ("noise_fraction", self.noise_fraction),
-        ];
-        for (name, value) in positive {
-            if let Some(value) = value
-                && !(value > 0.0 && value.is_finite())
-            {
-                return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
-            }
-        }
-        let angle = self.max_normal_angle_rad;
-        if !(angle > 0.0 && angle <= std::f64::consts::PI) {
-            return Err(Error::InvalidOption {
-                name: "max_normal_angle_rad",
-                value: angle,
-                domain: "above 0, at most pi",
-            });
-        }
-        let counts = [
-            ("levels", self.levels, 1, 4, "1 to 4"),
-            ("max_iterations", self.max_iterations, 1, usize::MAX, "1 or more"),
-            ("min_correspondences", self.min_correspondences, 6, usize::MAX, "6 or more"),
-        ];
-        for (name, value, least, most, domain) in counts {
-            if value < least || value > most {
-                return Err(Error::InvalidOption { name, value: value as f64, domain });
-            }
-        }
+        require_positive("max_motion_sigma_m", self.max_motion_sigma_m)?;
+        require_positive("step_tolerance_m", self.step_tolerance_m)?;
+        require_positive("noise_fraction", self.noise_fraction)?;
+        let is_angle = |angle| angle > 0.0 && angle <= std::f64::consts::PI;
+        require_option("max_normal_angle_rad", self.max_normal_angle_rad, "above 0, at most pi", is_angle)?;
+        require_option("levels", self.levels as f64, "1 to 4", |levels| (1.0..=4.0).contains(&levels))?;
+        require_count("max_iterations", self.max_iterations, 1)?;
+        require_count("min_correspondences", self.min_correspondences, 6)?;
         match &self.prior {
             Some(prior) if prior.iter().any(|v| !v.is_finite()) => {
-                Err(Error::NonFinite { what: "the prior", index: 0 })
+                Err(InputError::NonFinite { what: "the prior", index: 0 }.into())
             }
             Some(prior) if prior.cholesky().is_none() => {
                 let value = prior.diagonal().min();
-                Err(Error::InvalidOption { name: "prior", value, domain: "positive definite" })
+                Err(InputError::InvalidOption { name: "prior", value, domain: "positive definite" }.into())
             }
             _ => Ok(()),
         }

@@ -1,11 +1,12 @@
 //! The normal equations of all stations and shared parameters.
 
 use nalgebra::{DMatrix, DVector, Isometry3};
+use rigid_pose::InputError;
 
 use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::network::{Network, State};
 use crate::adjustment::turns::MeasuredTurn;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::planes::elimination::{Eliminated, Products, motion_of};
 use crate::planes::shared_planes::SharedPlane;
 
@@ -82,9 +83,9 @@ impl Equations {
         let scaled = DMatrix::from_fn(n, n, |r, c| {
             0.5 * (normal[(free[r], free[c])] + normal[(free[c], free[r])]) * scale[r] * scale[c]
         });
-        let failed = |why| Error::Numerical { what: "the normal equations of all stations", why };
+        let failed = |why| InputError::Numerical { what: "the normal equations of all stations", why };
         if scaled.iter().chain(right.iter()).any(|value| !value.is_finite()) {
-            return Err(failed("they are not finite"));
+            return Err(failed("they are not finite").into());
         }
         let inverse = scaled.cholesky().ok_or(failed("an unknown is not determined"))?.inverse();
         let mut cofactors = DMatrix::zeros(size, size);

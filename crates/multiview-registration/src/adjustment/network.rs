@@ -5,10 +5,10 @@ use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
 
 use crate::adjustment::sparse_equations::SparseEquations;
 use crate::adjustment::turns::MeasuredTurn;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::planes::reduction::{PairContacts, Reduced};
 use crate::relative_pose::{adjustment, relative_pose_parts};
-use rigid_pose::step_pose;
+use rigid_pose::{InputError, step_pose};
 
 /// Steps of many stations onto what their pairs observe: relative poses bend with large turns, and contacts are found anew anyway.
 const RELATIVE_STEPS: usize = 2;
@@ -116,9 +116,8 @@ impl Network<'_> {
                 let ends = [pair_contacts.target, pair_contacts.source];
                 let values = ends.map(|station| adjust::RigidPose::values(&state.poses[station]));
                 let (v, by_target, by_source) =
-                    relative_pose_parts(&reduced.pose, &[&values[0], &values[1]]).map_err(|_| Error::Numerical {
-                        what: "the relative pose of two stations",
-                        why: "it is no pose",
+                    relative_pose_parts(&reduced.pose, &[&values[0], &values[1]]).map_err(|_| {
+                        InputError::Numerical { what: "the relative pose of two stations", why: "it is no pose" }
                     })?;
                 let residual = share * (&reduced.right - &reduced.rows * v);
                 let rows = share * &reduced.rows;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use statistics::{mad_scale, upper_median};
 
 use crate::adjustment::network::{Anchors, Network, State, largest_step};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::planes::contacts::{Contact, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, Weighting, reduce};
 use crate::surfaces::extents::{Extent, Extents};
@@ -14,7 +14,7 @@ use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::point_model::PointModel;
 use crate::surfaces::points::StationPoints;
 use icp_registration::RobustKernel;
-use rigid_pose::pose_difference;
+use rigid_pose::{InputError, pose_difference};
 
 /// Most rounds of a level, and the part of its limit that a step must be below for it to end.
 const ROUNDS: usize = 8;
@@ -89,9 +89,9 @@ fn at_parameters(
     for index in surface.members.iter().map(|&index| index as usize) {
         points[index] = model.point(station, index, parameters, Some(&mut of_points[index * m..(index + 1) * m]));
     }
-    point_cloud::check_points("points of the point model", &points)?;
+    rigid_pose::require_points("points of the point model", &points)?;
     if let Some(index) = of_points.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
-        return Err(Error::NonFinite { what: "derivatives of the point model", index });
+        return Err(InputError::NonFinite { what: "derivatives of the point model", index }.into());
     }
     let surface = surface.refitted(&points)?;
     let derivatives = averaged(&surface, &of_points, m);
@@ -124,8 +124,8 @@ pub(crate) fn near_each_other(
     let size_m = surfaces.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
     let extent = |(surface, pose): (&&Surface, &Isometry3<f64>)| {
         let centres = surface.patches.iter().map(|patch| &patch.centre);
-        if let Some(index) = centres.clone().position(|centre| !point_cloud::is_usable(&(pose * centre))) {
-            return Err(Error::NonFinite { what: "points of a station in the frame of another", index });
+        if let Some(index) = centres.clone().position(|centre| !rigid_pose::is_usable(&(pose * centre))) {
+            return Err(InputError::NonFinite { what: "points of a station in the frame of another", index }.into());
         }
         Ok(Extent::placed(centres, pose))
     };

@@ -4,13 +4,13 @@
 //! the floor of a building, stays beside them: eliminated, it would fill the whole matrix.
 
 use nalgebra::{Const, DVector, Dyn, Isometry3, Matrix3, Matrix6, Matrix6x3, OMatrix, U6};
-use rigid_pose::pose_difference;
+use rigid_pose::{InputError, pose_difference};
 use sparse_matrices::BlockMatrix;
 
 use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::network::Network;
 use crate::adjustment::turns::MeasuredTurn;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::planes::elimination::{Eliminated, Products, WideProducts, motion_of};
 use crate::planes::shared_planes::SharedPlane;
 
@@ -133,9 +133,9 @@ impl SparseEquations {
                 normal.add_to_diagonal(self.normal.start(station) + k, network.hold_weight(k));
             }
         }
-        let failed = |why| Error::Numerical { what: "the normal equations of all stations", why };
+        let failed = |why| InputError::Numerical { what: "the normal equations of all stations", why };
         if normal.diagonal().iter().chain(self.right.iter()).any(|value| !value.is_finite()) {
-            return Err(failed("they are not finite"));
+            return Err(failed("they are not finite").into());
         }
         let factor = normal.factor().ok_or(failed("an unknown is not determined"))?;
         let starts = (0..=self.stations).map(|station| normal.start(station)).collect();

@@ -2,6 +2,7 @@
 
 use adjust::RigidPose;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, UnitQuaternion, Vector3};
+use rigid_pose::InputError;
 
 use crate::error::{Error, Result};
 use crate::planes::reduction::Reduced;
@@ -35,7 +36,11 @@ impl MeasuredTurn {
         }
         let whole = self.first_from_second.coords.iter().all(|value| value.is_finite()) && self.first != self.second;
         if !whole || self.whitening().is_none() {
-            return Err(Error::NonFinite { what: "turns between stations, or their covariance", index: self.first });
+            return Err(InputError::NonFinite {
+                what: "turns between stations, or their covariance",
+                index: self.first,
+            }
+            .into());
         }
         Ok(())
     }

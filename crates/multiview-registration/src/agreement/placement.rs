@@ -9,13 +9,13 @@ use rayon::prelude::*;
 
 use crate::agreement::judges::Judges;
 use crate::agreement::sight::{Sight, may_judge};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::surfaces::patches::faces_origin;
 use global_registration::{
     CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, agreement_of_rooms, in_voxels,
 };
 use point_cloud::Cloud;
-use rigid_pose::is_finite;
+use rigid_pose::{InputError, is_finite};
 use statistics::Distribution;
 
 /// How often what is usual in the survey a station must be contradicted to be doubted.
@@ -111,12 +111,12 @@ impl Placements {
 /// the space they looked through.
 ///
 /// # Errors
-/// [`Error::Empty`], [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::NotPositive`] for the input.
+/// [`InputError::Empty`], [`InputError::LengthMismatch`], [`InputError::NonFinite`], [`InputError::NotPositive`] for the input.
 pub fn judge_placements(stations: &[Cloud], world_from_station: &[Isometry3<f64>]) -> Result<Placements> {
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
     crate::relative_pose::require_poses(stations.len(), world_from_station)?;
     if let Some(index) = world_from_station.iter().position(|pose| !is_finite(pose)) {
-        return Err(Error::NonFinite { what: "poses of the stations", index });
+        return Err(InputError::NonFinite { what: "poses of the stations", index }.into());
     }
     let clouds = prepared(stations);
     let sights: Vec<Option<Sight>> = clouds.iter().map(|cloud| cloud.as_ref().map(Sight::new)).collect();

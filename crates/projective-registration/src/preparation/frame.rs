@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rigid_pose::require_length;
+
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
@@ -61,7 +63,7 @@ impl OrganisedFrame {
     /// theirs.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
+    /// [`InputError::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
     /// not lie on the rays of their pixels.
     pub fn new(projection: &Arc<Projection>, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<Self> {
         let grid = Arc::clone(&projection.grids[0]);
@@ -94,14 +96,8 @@ impl OrganisedFrame {
     pub fn update(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<()> {
         let (width, height) = (self.projection.width(), self.projection.height());
         let expected = width * height;
-        if points.len() != expected {
-            return Err(Error::LengthMismatch { what: "points of the frame", expected, found: points.len() });
-        }
-        if let Some(sigma) = sigma
-            && sigma.len() != expected
-        {
-            return Err(Error::LengthMismatch { what: "sigma", expected, found: sigma.len() });
-        }
+        require_length("points of the frame", expected, points.len())?;
+        require_length("sigma", expected, sigma.map(<[f32]>::len))?;
         check_rays(&self.projection, points)?;
         self.has_sigma = sigma.is_some();
         for level in 0..self.projection.grids.len() {

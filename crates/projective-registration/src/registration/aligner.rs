@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Vector6};
 use statistics::SIGMA_OF_MAD;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::options::FrameAlignmentOptions;
 use crate::partners::pairs::Rules;
 use crate::partners::sums::{SUMS, median_residual, normal_equations};
@@ -15,7 +15,7 @@ use crate::registration::quality::{Cell, Hold, Verdict};
 use crate::shared_error::Sighting;
 use icp_registration::quality::Residuals;
 use icp_registration::{DegeneracyPolicy, IcpResult, StopReason, TUKEY};
-use rigid_pose::{Centred, is_finite, pose_difference, step_pose, symmetrised};
+use rigid_pose::{Centred, InputError, pose_difference, require_pose, step_pose, symmetrised};
 
 /// Of the biweight.
 pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
@@ -34,8 +34,8 @@ const COARSE_TOLERANCE: f64 = 1e-3;
 /// streams, keep a [`FrameAligner`].
 ///
 /// # Errors
-/// [`Error::TooFewPoints`] for frames without planes, [`Error::TooFewCorrespondences`] where frames do not overlap at
-/// the guess, [`Error::NonFinite`] for the guess, [`Error::InvalidOption`].
+/// [`InputError::TooFewPoints`] for frames without planes, [`InputError::TooFewCorrespondences`] where frames do not overlap at
+/// the guess, [`InputError::NonFinite`] for the guess, [`InputError::InvalidOption`].
 pub fn align_frames(
     source: &OrganisedFrame,
     target: &OrganisedFrame,
@@ -57,7 +57,7 @@ pub struct FrameAligner {
 
 impl FrameAligner {
     /// # Errors
-    /// [`Error::InvalidOption`].
+    /// [`InputError::InvalidOption`].
     pub fn new(options: FrameAlignmentOptions) -> Result<Self> {
         options.validate()?;
         Ok(Self {
@@ -80,13 +80,11 @@ impl FrameAligner {
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
     ) -> Result<IcpResult> {
-        if !is_finite(guess) {
-            return Err(Error::NonFinite { what: "the guess", index: 0 });
-        }
+        require_pose("the guess", guess)?;
         for (what, frame) in [("the source frame", source), ("the target frame", target)] {
             if frame.len() < self.options.min_correspondences {
                 let needed = self.options.min_correspondences;
-                return Err(Error::TooFewPoints { what, found: frame.len(), needed });
+                return Err(InputError::TooFewPoints { what, found: frame.len(), needed }.into());
             }
         }
         let rules = Rules {
@@ -244,7 +242,7 @@ impl FrameAligner {
         let (moved, frame) = moved(track, source, target);
         let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
         if normal.pairs < self.options.min_correspondences {
-            return Err(self.too_few(normal.pairs, source.len(), track));
+            return Err(self.too_few(normal.pairs, source.len(), track).into());
         }
         let step = normal.equations.step(&track.free, damping)?;
         track.pose = frame.moved(&track.pose, &step);
@@ -274,7 +272,7 @@ impl FrameAligner {
         let to_tangent = frame.tangent_from_motion(&pose);
         let centred = if let Some(prior) = &self.options.prior {
             let what = "the tangent of the pose";
-            let from_tangent = to_tangent.try_inverse().ok_or(Error::Numerical { what, why: "it is singular" })?;
+            let from_tangent = to_tangent.try_inverse().ok_or(InputError::Numerical { what, why: "it is singular" })?;
             let offset = from_tangent * pose_difference(&pose, guess);
             let prior = symmetrised(&(from_tangent * prior * from_tangent.transpose()));
             let (step, covariance) = verdict.fused(&offset, &prior)?;
@@ -311,8 +309,8 @@ impl FrameAligner {
         self.options.max_motion_sigma_m.unwrap_or(frame.radius_m / 300.0)
     }
 
-    fn too_few(&self, found: usize, of: usize, track: &Track) -> Error {
-        Error::TooFewCorrespondences {
+    fn too_few(&self, found: usize, of: usize, track: &Track) -> InputError {
+        InputError::TooFewCorrespondences {
             found,
             of,
             needed: self.options.min_correspondences,

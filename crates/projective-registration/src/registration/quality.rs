@@ -13,14 +13,14 @@
 use nalgebra::{DMatrix, Matrix6, Vector6};
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
 use crate::partners::sums::{self, Normal, derivatives};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};
 use icp_registration::UndeterminedMotion;
 use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, Residuals, SIGNIFICANCE, expanded};
-use rigid_pose::{Centred, symmetric, symmetrised};
+use rigid_pose::{Centred, InputError, symmetric, symmetrised};
 
 /// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above
 /// which a cell is not one of these.
@@ -113,7 +113,7 @@ impl Verdict {
     /// What the pairs do not determine comes from the guess alone.
     pub(crate) fn fused(&self, offset: &Vector6<f64>, prior: &Matrix6<f64>) -> Result<(Vector6<f64>, Matrix6<f64>)> {
         let what = "the information of pairs and prior";
-        let error = Error::Numerical { what, why: "it is not positive definite" };
+        let error = InputError::Numerical { what, why: "it is not positive definite" };
         let (basis, inside) = self.known(Hold::Undetermined);
         let from_pairs = inside.cholesky().ok_or(error.clone())?.inverse();
         let from_guess = prior.cholesky().ok_or(error.clone())?.inverse();

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
-use crate::error::{Error, Result};
-use rigid_pose::{is_finite, pose_difference};
+use crate::error::Result;
+use rigid_pose::{InputError, is_finite, pose_difference, require_length};
 
 /// The residual of a relative pose, and the Jacobians of the model by target and source.
 pub(super) fn relative_pose_parts(
@@ -50,11 +50,9 @@ fn inverse_left_jacobian(v: &Vector3<f64>) -> Matrix3<f64> {
 
 /// Refuses other than one finite pose for each of some stations, or frames.
 pub(super) fn check_poses(what: &'static str, stations: usize, poses: &[Isometry3<f64>]) -> Result<()> {
-    if poses.len() != stations {
-        return Err(Error::LengthMismatch { what, expected: stations, found: poses.len() });
-    }
+    require_length(what, stations, poses.len())?;
     match poses.iter().position(|pose| !is_finite(pose)) {
-        Some(index) => Err(Error::NonFinite { what, index }),
+        Some(index) => Err(InputError::NonFinite { what, index }.into()),
         None => Ok(()),
     }
 }

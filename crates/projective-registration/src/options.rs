@@ -1,7 +1,8 @@
 //! What can be chosen in the registration of frames.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::shared_error::SharedError;
+use rigid_pose::{require_count, require_option, require_positive};
 
 /// Options of [`align_frames`](crate::align_frames). The defaults carry no scale: lengths come from the frames.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,27 +57,10 @@ impl Default for FrameAlignmentOptions {
 
 impl FrameAlignmentOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        let positive = [
-            ("max_motion_sigma_m", self.max_motion_sigma_m),
-            ("step_tolerance_m", self.step_tolerance_m),
-            ("noise_fraction", self.noise_fraction),
-        ];
-        for (name, value) in positive {
-            if let Some(value) = value
-                && !(value > 0.0 && value.is_finite())
-            {
-                return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
-            }
-        }
-        let counts = [
-            ("levels", self.levels, 1, 4, "1 to 4"),
-            ("max_iterations", self.max_iterations, 1, usize::MAX, "1 or more"),
-        ];
-        for (name, value, least, most, domain) in counts {
-            if value < least || value > most {
-                return Err(Error::InvalidOption { name, value: value as f64, domain });
-            }
-        }
-        Ok(())
+        require_positive("max_motion_sigma_m", self.max_motion_sigma_m)?;
+        require_positive("step_tolerance_m", self.step_tolerance_m)?;
+        require_positive("noise_fraction", self.noise_fraction)?;
+        require_option("levels", self.levels as f64, "1 to 4", |levels| (1.0..=4.0).contains(&levels))?;
+        Ok(require_count("max_iterations", self.max_iterations, 1)?)
     }
 }

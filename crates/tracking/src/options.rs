@@ -1,8 +1,9 @@
 //! What can be chosen in tracking.
 
 use nalgebra::Isometry3;
+use rigid_pose::{require_count, require_option, require_pose};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use projective_registration::FrameAlignmentOptions;
 
 /// Whether keyframes learn from the frames tracked against them.
@@ -77,17 +78,9 @@ impl Default for TrackerOptions {
 
 impl TrackerOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        if !rigid_pose::is_finite(&self.world_from_first) {
-            return Err(Error::NonFinite { what: "world_from_first", index: 0 });
-        }
-        if !(self.keyframe_overlap > 0.0 && self.keyframe_overlap < 1.0) {
-            let value = self.keyframe_overlap;
-            return Err(Error::InvalidOption { name: "keyframe_overlap", value, domain: "above 0 and below 1" });
-        }
-        if self.max_keyframes < 2 {
-            let value = self.max_keyframes as f64;
-            return Err(Error::InvalidOption { name: "max_keyframes", value, domain: "2 or more" });
-        }
-        Ok(())
+        require_pose("world_from_first", &self.world_from_first)?;
+        let is_share = |overlap| overlap > 0.0 && overlap < 1.0;
+        require_option("keyframe_overlap", self.keyframe_overlap, "above 0 and below 1", is_share)?;
+        Ok(require_count("max_keyframes", self.max_keyframes, 2)?)
     }
 }

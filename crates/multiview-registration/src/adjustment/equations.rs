@@ -4,13 +4,13 @@
 //! building, stays beside them: eliminated, it would fill the whole matrix.
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, Isometry3, Matrix3, Matrix6, Matrix6x3, OMatrix, U6};
-use rigid_pose::pose_difference;
+use rigid_pose::{InputError, pose_difference};
 use sparse_matrices::BlockMatrix;
 
 use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::known::Known;
 use crate::adjustment::turns::MeasuredTurn;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::planes::elimination::{Eliminated, Products, WideProducts, motion_of};
 use crate::planes::shared_planes::SharedPlane;
 use crate::surfaces::point_model::Prior;
@@ -170,9 +170,9 @@ impl Equations {
                 normal.add_to_diagonal(self.normal.start(station) + k, known.weight(k));
             }
         }
-        let failed = |why| Error::Numerical { what: "the normal equations of all stations", why };
+        let failed = |why| InputError::Numerical { what: "the normal equations of all stations", why };
         if normal.diagonal().iter().chain(self.right.iter()).any(|value| !value.is_finite()) {
-            return Err(failed("they are not finite"));
+            return Err(failed("they are not finite").into());
         }
         let factor = normal.factor().ok_or(failed("an unknown is not determined"))?;
         Ok(Cofactors::new(factor, (0..=self.stations + 1).map(|block| normal.start(block)).collect()))

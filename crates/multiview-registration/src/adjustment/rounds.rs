@@ -2,11 +2,12 @@
 
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
+use rigid_pose::InputError;
 use statistics::mad_scale;
 
 use crate::adjustment::known::Known;
 use crate::adjustment::network::{Anchors, Network, State, largest_step};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::planes::contacts::{Contact, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, reduce};
 use crate::surfaces::extents::{Extent, Extents};
@@ -82,9 +83,9 @@ fn at_parameters(
     for index in surface.members.iter().map(|&index| index as usize) {
         points[index] = model.point(station, index, parameters, Some(&mut of_points[index * m..(index + 1) * m]));
     }
-    point_cloud::check_points("points of the point model", &points)?;
+    rigid_pose::require_points("points of the point model", &points)?;
     if let Some(index) = of_points.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
-        return Err(Error::NonFinite { what: "derivatives of the point model", index });
+        return Err(InputError::NonFinite { what: "derivatives of the point model", index }.into());
     }
     let surface = surface.refitted(&points)?;
     let derivatives = averaged(&surface, &of_points, m);
@@ -117,8 +118,8 @@ pub(crate) fn near_each_other(
     let size_m = surfaces.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
     let extent = |(surface, pose): (&&Surface, &Isometry3<f64>)| {
         let centres = surface.patches.iter().map(|patch| &patch.centre);
-        if let Some(index) = centres.clone().position(|centre| !point_cloud::is_usable(&(pose * centre))) {
-            return Err(Error::NonFinite { what: "points of a station in the frame of another", index });
+        if let Some(index) = centres.clone().position(|centre| !rigid_pose::is_usable(&(pose * centre))) {
+            return Err(InputError::NonFinite { what: "points of a station in the frame of another", index }.into());
         }
         Ok(Extent::placed(centres, pose))
     };

@@ -1,6 +1,7 @@
 //! Turns between stations that something else measures: an inertial unit.
 
 use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, UnitQuaternion, Vector3};
+use rigid_pose::InputError;
 
 use crate::error::{Error, Result};
 use crate::relative_pose::relative_pose_parts;
@@ -33,7 +34,11 @@ impl MeasuredTurn {
         }
         let whole = self.first_from_second.coords.iter().all(|value| value.is_finite()) && self.first != self.second;
         if !whole || self.whitening().is_none() {
-            return Err(Error::NonFinite { what: "turns between stations, or their covariance", index: self.first });
+            return Err(InputError::NonFinite {
+                what: "turns between stations, or their covariance",
+                index: self.first,
+            }
+            .into());
         }
         Ok(())
     }

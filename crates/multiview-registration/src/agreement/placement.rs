@@ -9,13 +9,14 @@ use rayon::prelude::*;
 
 use crate::agreement::judges::Judges;
 use crate::agreement::sight::{Sight, may_judge};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::relative_pose::check_poses;
 use crate::surfaces::patches::faces_origin;
 use global_registration::{
     CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, agreement_of_rooms, in_voxels,
 };
 use point_cloud::Cloud;
+use rigid_pose::InputError;
 use statistics::Distribution;
 
 /// How often what is usual in the survey a station must be contradicted to be doubted.
@@ -111,11 +112,11 @@ impl Placements {
 /// the space they looked through.
 ///
 /// # Errors
-/// [`Error::Empty`], [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::NotPositive`] for the input.
+/// [`InputError::Empty`], [`InputError::LengthMismatch`], [`InputError::NonFinite`], [`InputError::NotPositive`] for the input.
 pub fn judge_placements(stations: &[Cloud], world_from_station: &[Isometry3<f64>]) -> Result<Placements> {
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
     if stations.is_empty() {
-        return Err(Error::Empty { what: "the list of stations" });
+        return Err(InputError::Empty { what: "the list of stations" }.into());
     }
     check_poses("poses of the stations", stations.len(), world_from_station)?;
     let clouds = prepared(stations);

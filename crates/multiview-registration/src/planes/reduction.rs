@@ -6,8 +6,9 @@
 //! that thousands of single observations would give it, at the price of six a pair.
 
 use nalgebra::{DMatrix, DVector, Isometry3, SymmetricEigen};
+use rigid_pose::InputError;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::planes::contacts::{Contact, Observed, imitated, observe};
 use crate::surfaces::patches::Surface;
 use icp_registration::RobustKernel;
@@ -136,9 +137,9 @@ fn observations(
     });
     let scaled = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |r, c| 0.5 * (m[(r, c)] + m[(c, r)]) * scale[r] * scale[c]);
     let (information, imitation) = (scaled(information), scaled(imitation));
-    let failed = |why| Error::Numerical { what: "the normal equations of a pair of stations", why };
+    let failed = |why| InputError::Numerical { what: "the normal equations of a pair of stations", why };
     if information.iter().chain(gradient.iter()).any(|v| !v.is_finite()) {
-        return Err(failed("they are not finite"));
+        return Err(failed("they are not finite").into());
     }
     let eigen = SymmetricEigen::try_new(information, 1e-15, 10_000).ok_or(failed("no eigenvalues were found"))?;
     let largest = eigen.eigenvalues.max();

@@ -7,9 +7,10 @@
 //! happens to resemble that of its partner.
 
 use nalgebra::{Point3, Vector3};
+use rigid_pose::InputError;
 use statistics::upper_median;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::surfaces::extents::Extent;
 use crate::surfaces::grouping::group;
 use crate::surfaces::plane_fit::{Moments, Plane, SAME_DIRECTION};
@@ -145,7 +146,9 @@ impl Surface {
 
     fn from_fits(groups: Groups, fits: &[(Moments, Plane)], origin: &Vector3<f64>, size_m: f64) -> Result<Self> {
         if fits.is_empty() {
-            return Err(Error::TooFewPoints { what: "surfaces of a station", found: 0, needed: FEWEST_POINTS });
+            return Err(
+                InputError::TooFewPoints { what: "surfaces of a station", found: 0, needed: FEWEST_POINTS }.into()
+            );
         }
         let centres = centres(fits, origin);
         let tree = NeighbourTree::new(&centres)?;

@@ -23,6 +23,7 @@ use crate::survey::registration::{
 };
 use crate::survey::together::{Brought, brought_together, is_whole, network, prior_of};
 use point_cloud::Cloud;
+use rigid_pose::{InputError, require_option, require_positive};
 
 /// Most stations at once from approximate poses. In buildings of so many (see docs/benchmarks.md) all come into their places, or are
 /// named; of more that has not been shown.
@@ -40,9 +41,9 @@ const MOST_ARRANGED: usize = 200;
 /// Clouds without normals get them from their nearest neighbours.
 ///
 /// # Errors
-/// [`Error::UnconnectedStations`] names stations that no pair leads to; [`Error::TooManyStations`]; [`Error::Empty`], [`Error::LengthMismatch`],
-/// [`Error::NonFinite`], [`Error::NotPositive`], [`Error::NoSuchStation`], [`Error::InvalidOption`] for the input;
-/// [`Error::Numerical`] where shared parameters are not determined.
+/// [`Error::UnconnectedStations`] names stations that no pair leads to; [`Error::TooManyStations`]; [`InputError::Empty`],
+/// [`InputError::LengthMismatch`], [`InputError::NonFinite`], [`InputError::NotPositive`], [`Error::NoSuchStation`],
+/// [`InputError::InvalidOption`] for the input; [`InputError::Numerical`] where shared parameters are not determined.
 pub fn register_stations(
     stations: &[Cloud],
     start: Start<'_>,
@@ -92,7 +93,7 @@ fn validate(
     options: &StationRegistrationOptions<'_>,
 ) -> Result<()> {
     if stations.is_empty() {
-        return Err(Error::Empty { what: "the list of stations" });
+        return Err(InputError::Empty { what: "the list of stations" }.into());
     }
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
     if let Start::Poses(poses) = start {
@@ -104,18 +105,9 @@ fn validate(
         return Err(Error::NoSuchStation { station, count });
     }
     options.turns.iter().try_for_each(|turn| turn.check(count))?;
-    let lengths = [("start_error_m", options.start_error_m), ("patch_m", options.patch_m)];
-    for (name, value) in lengths {
-        if let Some(value) = value
-            && !(value > 0.0 && value < 1e100)
-        {
-            return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
-        }
-    }
-    if !(options.minimum_overlap >= 0.0 && options.minimum_overlap <= 1.0) {
-        return Err(Error::InvalidOption { name: "minimum_overlap", value: options.minimum_overlap, domain: "0 to 1" });
-    }
-    Ok(())
+    require_positive("start_error_m", options.start_error_m)?;
+    require_positive("patch_m", options.patch_m)?;
+    Ok(require_option("minimum_overlap", options.minimum_overlap, "0 to 1", |share| (0.0..=1.0).contains(&share))?)
 }
 
 /// Refuses what would come out wrong somewhere, or take hours. Shared parameters couple all stations: then they are adjusted as few are.

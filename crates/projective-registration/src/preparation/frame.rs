@@ -13,7 +13,7 @@ use crate::preparation::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
 use crate::preparation::planes::{FREEDOM, MOMENT, PlaneRow, ROUNDING};
 use crate::preparation::projection::Projection;
 use point_cloud::Cloud;
-use rigid_pose::Centred;
+use rigid_pose::{Centred, require_length};
 
 /// Windows whose mean square deviation exceeds that of most by this factor hold no plane.
 const LARGEST_MISFIT: f32 = 3.0;
@@ -62,7 +62,7 @@ impl OrganisedFrame {
     /// theirs.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
+    /// [`InputError::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
     /// not lie on the rays of their pixels.
     pub fn new(projection: &Arc<Projection>, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<Self> {
         let grid = Arc::clone(&projection.grids[0]);
@@ -95,14 +95,8 @@ impl OrganisedFrame {
     pub fn update(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<()> {
         let (width, height) = (self.projection.width(), self.projection.height());
         let expected = width * height;
-        if points.len() != expected {
-            return Err(Error::LengthMismatch { what: "points of the frame", expected, found: points.len() });
-        }
-        if let Some(sigma) = sigma
-            && sigma.len() != expected
-        {
-            return Err(Error::LengthMismatch { what: "sigma", expected, found: sigma.len() });
-        }
+        require_length("points of the frame", expected, points.len())?;
+        require_length("sigma", expected, sigma.map(<[f32]>::len))?;
         check_rays(&self.projection, points)?;
         self.has_sigma = sigma.is_some();
         for level in 0..self.projection.grids.len() {

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Vector6};
 use statistics::SIGMA_OF_MAD;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::options::FrameAlignmentOptions;
 use crate::partners::pairs::Rules;
 use crate::partners::sums::{SUMS, median_residual, normal_equations};
@@ -14,7 +14,7 @@ use crate::preparation::grid::STRIDES;
 use crate::registration::quality::{Cell, Verdict};
 use crate::shared_error::Sighting;
 use icp_registration::{IcpResult, StopReason, TUKEY};
-use rigid_pose::{Centred, is_finite, symmetrised};
+use rigid_pose::{Centred, InputError, require_pose, symmetrised};
 
 /// Of the biweight.
 pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
@@ -35,8 +35,8 @@ const COARSE_TOLERANCE: f64 = 1e-3;
 /// streams, keep a [`FrameAligner`].
 ///
 /// # Errors
-/// [`Error::TooFewPoints`] for frames without planes, [`Error::TooFewCorrespondences`] where frames do not overlap at
-/// the guess, [`Error::NonFinite`] for the guess, [`Error::InvalidOption`].
+/// [`InputError::TooFewPoints`] for frames without planes, [`InputError::TooFewCorrespondences`] where frames do not overlap at
+/// the guess, [`InputError::NonFinite`] for the guess, [`InputError::InvalidOption`].
 pub fn align_frames(
     source: &OrganisedFrame,
     target: &OrganisedFrame,
@@ -58,7 +58,7 @@ pub struct FrameAligner {
 
 impl FrameAligner {
     /// # Errors
-    /// [`Error::InvalidOption`].
+    /// [`InputError::InvalidOption`].
     pub fn new(options: FrameAlignmentOptions) -> Result<Self> {
         options.validate()?;
         Ok(Self {
@@ -76,12 +76,10 @@ impl FrameAligner {
     }
 
     pub(crate) fn registered(&mut self, frames: Frames<'_>, guess: &Isometry3<f64>) -> Result<IcpResult> {
-        if !is_finite(guess) {
-            return Err(Error::NonFinite { what: "the guess", index: 0 });
-        }
+        require_pose("the guess", guess)?;
         for (what, frame) in [("the source frame", frames.source), ("the target frame", frames.target)] {
             if frame.len() < FEWEST_PAIRS {
-                return Err(Error::TooFewPoints { what, found: frame.len(), needed: FEWEST_PAIRS });
+                return Err(InputError::TooFewPoints { what, found: frame.len(), needed: FEWEST_PAIRS }.into());
             }
         }
         let rules = Rules { extra_variance: 0.0, reach: BIWEIGHT };
@@ -186,7 +184,7 @@ impl FrameAligner {
         let (moved, frame) = frames.moved(track);
         let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
         if normal.pairs < FEWEST_PAIRS {
-            return Err(Self::too_few(normal.pairs, frames.source.len(), track));
+            return Err(Self::too_few(normal.pairs, frames.source.len(), track).into());
         }
         let step = normal.equations.step(&track.free, damping)?;
         track.pose = frame.moved(&track.pose, &step);
@@ -231,8 +229,8 @@ impl FrameAligner {
         })
     }
 
-    fn too_few(found: usize, of: usize, track: &Track) -> Error {
-        Error::TooFewCorrespondences {
+    fn too_few(found: usize, of: usize, track: &Track) -> InputError {
+        InputError::TooFewCorrespondences {
             found,
             of,
             needed: FEWEST_PAIRS,

@@ -1,4 +1,5 @@
-use crate::error::{Error, Result};
+use crate::error::Result;
+use rigid_pose::{require_option, require_positive};
 
 /// How fine a [`SurfaceMap`](crate::SurfaceMap) is, and how large it may become.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,14 +20,9 @@ impl Default for MapOptions {
 
 impl MapOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        if !(self.voxel_m.is_finite() && self.voxel_m > 0.0) {
-            return Err(Error::InvalidOption { name: "voxel_m", value: self.voxel_m, domain: "positive and finite" });
-        }
+        require_positive("voxel_m", self.voxel_m)?;
         // Points of eight voxels, each with some twenty normals 45° apart, must have room; numbers of points have 32 bits.
-        if self.most_points < 1000 || self.most_points > u32::MAX as usize {
-            let value = self.most_points as f64;
-            return Err(Error::InvalidOption { name: "most_points", value, domain: "1000 to 4294967295" });
-        }
-        Ok(())
+        let is_inside = |points| (1e3..=f64::from(u32::MAX)).contains(&points);
+        Ok(require_option("most_points", self.most_points as f64, "1000 to 4294967295", is_inside)?)
     }
 }

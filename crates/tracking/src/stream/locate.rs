@@ -9,10 +9,9 @@ use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
 use pose_graph::{Relation, is_likely};
 use projective_registration::{
-    Agreement, ByField, Field, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame,
+    Agreement, ByField, Error as FrameError, Field, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame,
 };
-use rigid_pose::Uncertain;
-use rigid_pose::{step_pose, symmetrised};
+use rigid_pose::{InputError, Uncertain, step_pose, symmetrised};
 
 /// Keyframes tried beside the reference.
 const NEIGHBOURS: usize = 2;
@@ -275,8 +274,8 @@ fn register(
     field: &Field,
 ) -> Result<Measured, LossReason> {
     let (result, influence) = aligner.align_apart(source, target, guess).map_err(|error| match error {
-        projective_registration::Error::TooFewPoints { .. } => LossReason::TooFewPoints,
-        projective_registration::Error::TooFewCorrespondences { .. } => LossReason::TooLittleOverlap,
+        FrameError::Input(InputError::TooFewPoints { .. }) => LossReason::TooFewPoints,
+        FrameError::Input(InputError::TooFewCorrespondences { .. }) => LossReason::TooLittleOverlap,
         _ => LossReason::NotConverged,
     })?;
     let aligned = result.target_from_source;

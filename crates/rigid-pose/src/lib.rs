@@ -20,4 +20,4 @@ pub use requirements::{
     is_finite, is_usable, require_count, require_length, require_option, require_points, require_pose, require_positive,
 };
 pub use tangent::{inverse_covariance_transport, pose_difference, step_pose, symmetrised};
-pub use uncertain::{Uncertain, inverse_jacobian, product_jacobians};
+pub use uncertain::{Uncertain, inverse_jacobian, product_jacobians, relative_jacobians};

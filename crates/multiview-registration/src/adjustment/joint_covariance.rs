@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Isometry3, Matrix6};
 
 use crate::adjustment::cofactors::Cofactors;
-use crate::relative_pose::relative_jacobians;
+use rigid_pose::relative_jacobians;
 
 /// The covariance of all poses, in tangents `[dt world axes, dtheta station axes]`, and shared parameters. Of large networks only
 /// those blocks are computed that are asked for.

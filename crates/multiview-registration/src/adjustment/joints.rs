@@ -3,8 +3,7 @@
 use nalgebra::{DVector, Isometry3, RowVector6, Vector6};
 
 use crate::adjustment::equations::{Equations, Rows};
-use crate::relative_pose::relative_jacobians;
-use rigid_pose::pose_difference;
+use rigid_pose::{pose_difference, relative_jacobians};
 
 /// A relative pose that is observed along one motion.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,9 +12,11 @@ use rigid_pose::{eigen6, step_pose};
 
 use crate::adjustment::joint_covariance::JointCovariance;
 use crate::adjustment::joints::Joint;
+use crate::agreement::loops::reached;
 use crate::error::Result;
-use crate::places::search::{LOOSE, Places, move_by, pairs, root};
+use crate::places::search::{LOOSE, Places, move_by, pairs};
 use crate::places::sought::{AGAINST_IT, BEGUN, SIGMAS};
+use crate::planes::shared_planes::root;
 
 /// Deviation of a relative pose from which a joint is looked at, patches: in buildings neighbours are held to 1 to 7 thousandths of one, and
 /// what hangs on a single face that was met in the wrong place to 13 (80 mm off). Smaller values only take time.
@@ -112,19 +114,9 @@ impl Places<'_> {
 
     /// Which stations lie on the other side of a pair of the tree than the one that is held.
     fn beyond(&self, tree: &[Weakest], joint: [usize; 2]) -> Vec<bool> {
-        let mut next = vec![Vec::new(); self.points.len()];
-        for [a, b] in tree.iter().map(|pair| pair.stations).filter(|pair| *pair != joint) {
-            next[a].push(b);
-            next[b].push(a);
-        }
-        let mut beyond = vec![true; self.points.len()];
-        let mut open = vec![self.network.fixed];
-        while let Some(station) = open.pop() {
-            if std::mem::take(&mut beyond[station]) {
-                open.extend(&next[station]);
-            }
-        }
-        beyond
+        let others = tree.iter().map(|pair| pair.stations).filter(|pair| *pair != joint);
+        let here = reached(&others.map(|[a, b]| (a, b)).collect::<Vec<_>>(), self.network.fixed);
+        (0..self.points.len()).map(|station| !here.contains(&station)).collect()
     }
 
     /// Slides what lies beyond a joint; returns whether it has moved.

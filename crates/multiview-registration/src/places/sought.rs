@@ -9,7 +9,7 @@ use crate::places::search::Places;
 use crate::planes::elimination::motion_of;
 use crate::planes::sightings::{Gate, NOWHERE, Sighting, Wide};
 use crate::surfaces::points::StationPoints;
-use rigid_pose::eigen6;
+use rigid_pose::{eigen6, product_jacobians};
 
 /// Steps of a slide, patches.
 const STEP: f64 = 0.25;
@@ -207,10 +207,8 @@ impl<'a> Sought<'a> {
 
     /// How the tangent of a pose follows shift and turn about where the station is now.
     fn tangent(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
-        let (mut by, apart) = (Matrix6::identity(), self.pose.translation.vector - pose.translation.vector);
-        by.fixed_view_mut::<3, 3>(0, 3).copy_from(&apart.cross_matrix());
-        by.fixed_view_mut::<3, 3>(3, 3).copy_from(&pose.rotation.inverse().to_rotation_matrix().into_inner());
-        by
+        let apart = pose.translation.vector - self.pose.translation.vector;
+        product_jacobians(&Isometry3::identity(), &Isometry3::from_parts(apart.into(), pose.rotation)).0
     }
 
     /// The station moved onto the planes.

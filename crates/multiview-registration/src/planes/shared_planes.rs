@@ -112,11 +112,8 @@ impl<'a> Joined<'a> {
         Self { surfaces, poses, centre, tolerance_m, first, parent, moments, normals }
     }
 
-    fn root(&self, mut node: usize) -> usize {
-        while self.parent[node] != node {
-            node = self.parent[node];
-        }
-        node
+    fn root(&self, node: usize) -> usize {
+        root(&self.parent, node)
     }
 
     fn node(&self, station: usize, patch: u32) -> Option<usize> {
@@ -295,6 +292,14 @@ impl<'a> Joined<'a> {
             shared_planes.push(shared_plane);
         }
     }
+}
+
+/// The root of the tree that a node of a forest belongs to.
+pub(crate) fn root(parent: &[usize], mut node: usize) -> usize {
+    while parent[node] != node {
+        node = parent[node];
+    }
+    node
 }
 
 /// The patches of one piece of a plane, cell by cell.

@@ -18,8 +18,8 @@ use icp_registration::{RobustKernel, TUKEY};
 pub(crate) const KERNEL: RobustKernel = RobustKernel::Tukey;
 /// Smallest cosine between ray and normal.
 const GRAZING: f64 = 0.03;
-/// Standard deviations between the ranges of two shared planes below which they are not told apart.
-const APART: f64 = 7.0;
+/// Standard deviations between ranges below which they are not told apart: those of two shared planes, or of a point and what is before it.
+pub(crate) const APART: f64 = 7.0;
 
 /// The tile of a point that lies on none.
 pub(crate) const NOWHERE: u32 = u32::MAX;

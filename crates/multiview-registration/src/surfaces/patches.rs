@@ -18,8 +18,8 @@ use crate::surfaces::regions::{Patches, Region};
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
 
-/// Fewest points of a patch.
-const FEWEST_POINTS: usize = 6;
+/// Fewest points of a patch: those whose scatter about a plane says something.
+pub(crate) const FEWEST_POINTS: usize = 6;
 /// Neighbouring patches that may belong to the same plane: those around one in a grid, and some more.
 const NEIGHBOURS: usize = 13;
 /// Reach of the neighbourhood, in patches.

@@ -10,9 +10,8 @@ use super::*;
 use crate::adjustment::equations::Equations;
 use crate::adjustment::joint_covariance::JointCovariance;
 use crate::places::joints::Weakest;
-use crate::relative_pose::relative_jacobians;
 use plan::{Building, Camera};
-use rigid_pose::step_pose;
+use rigid_pose::{relative_jacobians, step_pose};
 
 #[path = "../../examples/building/plan.rs"]
 mod plan;

@@ -15,9 +15,8 @@ use crate::preparation::grid::{BLOCK, Grid};
 use crate::preparation::projection::Lens;
 use crate::preparation::table::Table;
 
-/// Above the number of nodes of any frame, and the bits of single precision that hold what is below it.
+/// Above the number of nodes of any frame: from there on single precision holds whole numbers, in its low bits.
 const TWO_TO_23: f32 = 8_388_608.0;
-const LOW_BITS: u32 = (1 << 23) - 1;
 
 /// Smallest cosine between the normals of a pair (45 degrees): directions of planes through few noisy nodes scatter by some twenty each.
 const LEAST_COSINE: f32 = std::f32::consts::FRAC_1_SQRT_2;
@@ -300,7 +299,7 @@ impl<'a> Moved<'a> {
             let col = if col < most_col { col } else { most_col };
             let row = if row < most_row { row } else { most_row };
             // Whole numbers below 2²³ as the low bits of their sum with it: a cast would be done lane by lane.
-            node[k] = (row.floor() * cols + col.floor() + TWO_TO_23).to_bits() & LOW_BITS;
+            node[k] = (row.floor() * cols + col.floor() + TWO_TO_23).to_bits() ^ TWO_TO_23.to_bits();
         }
         let (mut nodes, mut variances) = ([[f32::NAN; 4]; BLOCK], [f32::NAN; BLOCK]);
         for k in 0..BLOCK {

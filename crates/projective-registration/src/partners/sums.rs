@@ -17,8 +17,6 @@ use crate::preparation::grid::BLOCK;
 pub(crate) const CHUNK: usize = 32;
 /// Chunks that one thread takes at least.
 const CHUNKS_PER_TASK: usize = 4;
-/// Blocks of a sample that one thread takes at least.
-const SAMPLED_PER_TASK: usize = 64;
 /// 21 products of the derivatives, 6 with the residual, and the sums of weight, weighted squares and pairs.
 pub(crate) const SUMS: usize = 30;
 
@@ -201,8 +199,7 @@ impl WithLocate for Sample<'_, '_> {
 
     fn run<L: Locate>(self, locate: L) {
         let (moved, rules, step) = (self.moved, self.rules, self.step);
-        let parts =
-            self.squares.par_chunks_mut(SAMPLED_PER_TASK * BLOCK).zip(self.blocks.par_chunks(SAMPLED_PER_TASK * step));
+        let parts = self.squares.par_chunks_mut(2 * CHUNK * BLOCK).zip(self.blocks.par_chunks(2 * CHUNK * step));
         parts.for_each(|(squares, blocks)| {
             let mut places = squares.chunks_exact_mut(BLOCK);
             let work = |pairs: &Pairs| {

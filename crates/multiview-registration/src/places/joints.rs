@@ -15,7 +15,7 @@ use crate::adjustment::joints::Joint;
 use crate::agreement::loops::reached;
 use crate::error::Result;
 use crate::places::search::{LOOSE, Places, move_by, pairs};
-use crate::places::sought::{AGAINST_IT, BEGUN, SIGMAS};
+use crate::places::sought::{AGAINST_IT, SIGMAS};
 use crate::planes::shared_planes::root;
 
 /// Deviation of a relative pose from which a joint is looked at, patches: in buildings neighbours are held to 1 to 7 thousandths of one, and
@@ -181,7 +181,7 @@ impl Places<'_> {
         (back_m, known_m): (f64, f64),
     ) -> Option<Between> {
         let step_m = STEP * self.size_m;
-        let reach_m = (BEGUN * known_m).max(self.size_m);
+        let reach_m = (SIGMAS * known_m).max(self.size_m);
         let [low, high] =
             [back_m.min(0.0) - reach_m, back_m.max(0.0) + reach_m].map(|slide_m| (slide_m / step_m).round() as i32);
         let motions: Vec<Isometry3<f64>> =

@@ -23,7 +23,8 @@ const STEPS: usize = 4;
 const OFF: f64 = 0.1;
 /// Standard deviations by which more points must lie on planes elsewhere, or fewer contradict: beyond chance, even if points come in
 /// groups of some five. Elsewhere stations of simulated buildings that are right come to 2.1, those 4 to 14 cm off from 19 to 42; with less,
-/// right ones are moved and doubted.
+/// right ones are moved and doubted. Those from where it began within which a station is sought, too: one in a million is farther off along
+/// some axis.
 pub(crate) const SIGMAS: f64 = 5.0;
 /// By which the other of the two may speak against it: as often as one time in forty by chance.
 pub(crate) const AGAINST_IT: f64 = 2.0;
@@ -31,8 +32,6 @@ pub(crate) const AGAINST_IT: f64 = 2.0;
 const FEWEST_AGAINST: usize = 20;
 /// How many points on planes each of them outweighs where several places are better: of each eighth point contradictions are counted.
 const AGAINST: f64 = 4.0;
-/// Standard deviations from where it began within which a station is sought: one in a million is farther off along some axis.
-pub(crate) const BEGUN: f64 = 5.0;
 
 /// A place of the station, with how many of its points lie on what the others saw.
 struct Place {
@@ -166,7 +165,7 @@ impl<'a> Sought<'a> {
     fn may_have_begun(&self, motion: &Isometry3<f64>) -> bool {
         let begun = &self.places.start[self.station];
         let off_m = ((motion * self.pose).translation.vector - begun.translation.vector).norm();
-        off_m <= BEGUN * self.places.known_m
+        off_m <= SIGMAS * self.places.known_m
     }
 
     /// The motion by shift and turn about where it is now.

@@ -12,7 +12,7 @@ use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::BLOCK;
 
 /// Distances from a plane within this multiple of their standard deviation agree with it.
-const AGREEING_SIGMA: f32 = 4.0;
+pub(crate) const AGREEING_SIGMA: f32 = 4.0;
 /// What maps and poses are wrong by beside the noise: this share of the depth.
 const AGREEING_SHARE: f32 = 0.005;
 /// Largest systematic error, share of the depth: 6 cm at 2 m, several times that of a Kinect. With 0.02 and 0.05 its paths are

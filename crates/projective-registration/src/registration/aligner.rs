@@ -23,7 +23,7 @@ pub(crate) const FEWEST_PAIRS: usize = 20;
 /// Residuals from which scales are taken.
 pub(crate) const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.
-const COARSE_ITERATIONS: usize = 8;
+pub(crate) const COARSE_ITERATIONS: usize = 8;
 /// First steps, which are least squares over all that is in reach.
 const WIDE_ITERATIONS: usize = 3;
 /// Coarse levels end when a step is below this, in units of the radius.
@@ -111,7 +111,7 @@ impl FrameAligner {
     /// The levels between the first and the last.
     pub(crate) fn approach(&mut self, track: &mut Track, frames: Frames<'_>) -> Result<()> {
         for level in self.first_level(frames).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
-            self.descend(track, frames, frames.blocks(level))?;
+            self.descend(track, frames, frames.blocks(level), COARSE_ITERATIONS)?;
         }
         Ok(())
     }
@@ -135,13 +135,8 @@ impl FrameAligner {
         Ok(())
     }
 
-    /// Passes one level.
-    pub(crate) fn descend(&mut self, track: &mut Track, frames: Frames<'_>, blocks: &[Block]) -> Result<()> {
-        self.descend_by(track, frames, blocks, COARSE_ITERATIONS)
-    }
-
     /// Passes one level with at most so many iterations.
-    pub(crate) fn descend_by(
+    pub(crate) fn descend(
         &mut self,
         track: &mut Track,
         frames: Frames<'_>,

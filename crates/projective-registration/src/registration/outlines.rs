@@ -4,15 +4,15 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
+use crate::partners::map::AGREEING_SIGMA;
 use crate::partners::pairs::{Locate, SinglePose, WithLocate, node_at, with_locate};
 use crate::partners::track::{Frames, Track};
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::aligner::FrameAligner;
 use icp_registration::{IcpResult, MotionKind, UndeterminedMotion};
 
-/// A point contradicts a plane that it lies in front of by this share of the radius and this multiple of its noise.
+/// A point contradicts a plane that it lies in front of by this share of the radius and what noise does.
 const TOLERANCE: f64 = 0.025;
-const SIGMAS: f32 = 4.0;
 /// Distance of the places that are tried along a motion, in units of the radius, and places on either side.
 const STEP: f64 = 0.006;
 const STEPS: usize = 50;
@@ -154,7 +154,7 @@ impl WithLocate for InFront<'_> {
             let [a, b, c, d] = self.target.planes[node];
             // Normals lead away from the camera.
             let residual = a * p[0] + b * p[1] + c * p[2] - d;
-            in_front += usize::from(residual < -(self.tolerance_m + SIGMAS * self.target.sigma[node]));
+            in_front += usize::from(residual < -(self.tolerance_m + AGREEING_SIGMA * self.target.sigma[node]));
             if in_front > self.most {
                 break;
             }

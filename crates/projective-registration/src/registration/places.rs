@@ -82,7 +82,7 @@ impl FrameAligner {
         let followed = starts(&start.pose, radius).into_par_iter().map_with(self.clone(), |aligner, pose| {
             let (mut track, blocks) = (Track { pose, ..start.clone() }, frames.blocks(level));
             aligner.open(&mut track, frames, blocks).ok()?;
-            aligner.descend_by(&mut track, frames, blocks, ITERATIONS).ok()?;
+            aligner.descend(&mut track, frames, blocks, ITERATIONS).ok()?;
             let counts = consistency(frames, &track.pose, level, TOLERANCE * radius);
             Some((weighed(&counts), track))
         });

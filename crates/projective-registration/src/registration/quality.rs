@@ -22,10 +22,8 @@ use icp_registration::UndeterminedMotion;
 use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
 use rigid_pose::{Centred, symmetric};
 
-/// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above
-/// which a cell is not one of these.
-const CLEAR_SIGNIFICANCE: f64 = 5.0;
-const CLIP: f64 = 5.0;
+/// What stands out beside cells that carry no information: its multiple of their scatter, and of the middle cell for one that is none of them.
+const CLEAR: f64 = 5.0;
 /// Share of the largest information that rounding can imitate (single precision).
 const ROUNDING: f64 = 1e-7;
 /// Smallest variance of the scores as a share of what the noise of the nodes lets expect: independent frames show about a
@@ -117,10 +115,10 @@ fn is_significant(cells: &[Cell], information: f64, vector: &Vector6<f64>) -> bo
     }
     each.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
     let Some(middle) = each.get(count / 2) else { return false };
-    let usual = CLIP * middle.abs();
+    let usual = CLEAR * middle.abs();
     let scatter = each.iter().map(|f| f.abs().min(usual).powi(2)).sum::<f64>().sqrt();
     let top = each.iter().copied().fold(0.0, f64::max);
-    information - top > CLEAR_SIGNIFICANCE * scatter
+    information - top > CLEAR * scatter
 }
 
 /// Covariance of the summed score from the scatter of its sums over cells.

@@ -8,7 +8,7 @@ use crate::partners::sums::agreement;
 use crate::partners::track::{Frames, Track};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::BLOCK;
-use crate::registration::aligner::FrameAligner;
+use crate::registration::aligner::{COARSE_ITERATIONS, FrameAligner};
 
 /// Distance within which points agree with target planes after the first level, in units of the radius.
 const AGREEMENT_TOLERANCE: f64 = 0.03;
@@ -61,7 +61,7 @@ impl FrameAligner {
     /// The track after the first level, and how far the frames agree there.
     fn attempt(&mut self, mut track: Track, frames: Frames<'_>, blocks: &[Block]) -> Result<(Track, f64)> {
         self.open(&mut track, frames, blocks)?;
-        self.descend(&mut track, frames, blocks)?;
+        self.descend(&mut track, frames, blocks, COARSE_ITERATIONS)?;
         let agreement = share_of_agreement(&track, frames, blocks);
         Ok((track, agreement))
     }

@@ -15,7 +15,7 @@ pub(super) fn relative_pose_parts(
     let v = pose_difference(&model, observed);
     // v moves by minus what the model moves by, the rotation through the inverse left Jacobian at v: log(exp(-dtheta) exp(v)).
     let turned = inverse_left_jacobian(&v.fixed_rows::<3>(3).into_owned());
-    let by = relative_jacobians(world_from_target, world_from_source).map(|mut by| {
+    let by = relative_jacobians(world_from_target, &model).map(|mut by| {
         let turns = turned * by.fixed_rows::<3>(3);
         by.fixed_rows_mut::<3>(3).copy_from(&turns);
         by

@@ -122,7 +122,7 @@ impl Graph {
             let by_field = information * observed.by_field;
             normal.field += observed.by_field.transpose() * by_field;
             normal.field_right -= by_field.transpose() * v;
-            let [by_a, by_b] = relative_jacobians(&poses[edge.a], &poses[edge.b]);
+            let [by_a, by_b] = relative_jacobians(&poses[edge.a], &model);
             let jacobians = [(edge.a, by_a), (edge.b, by_b)];
             for (k, jk) in jacobians.iter().filter(|(k, _)| *k != 0) {
                 let row = 6 * (k - 1);

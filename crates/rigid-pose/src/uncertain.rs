@@ -81,9 +81,8 @@ pub fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<f64>) -
 /// Jacobians of the tangent of `a_from_b`, the one of two poses in the frame of the other, by those of `world_from_a` and
 /// `world_from_b`.
 #[must_use]
-pub fn relative_jacobians(world_from_a: &Isometry3<f64>, world_from_b: &Isometry3<f64>) -> [Matrix6<f64>; 2] {
-    let a_from_world = world_from_a.inverse();
-    let (by_inverse, by_second) = product_jacobians(&a_from_world, world_from_b);
+pub fn relative_jacobians(world_from_a: &Isometry3<f64>, a_from_b: &Isometry3<f64>) -> [Matrix6<f64>; 2] {
+    let (by_inverse, by_second) = product_jacobians(&world_from_a.inverse(), &(world_from_a * a_from_b));
     [by_inverse * inverse_jacobian(world_from_a), by_second]
 }
 
@@ -114,7 +113,7 @@ mod tests {
     fn jacobians_of_products_agree_with_differences() {
         let (a, b) = (pose(1.1), pose(-0.6));
         let (by_first, by_second) = product_jacobians(&a, &b);
-        let by = relative_jacobians(&a, &b);
+        let by = relative_jacobians(&a, &(a.inverse() * b));
         let step = 1e-6;
         for k in 0..6 {
             let e = Vector6::from_fn(|i, _| if i == k { step } else { 0.0 });

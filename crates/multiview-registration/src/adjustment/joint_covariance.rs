@@ -43,15 +43,15 @@ impl JointCovariance {
         target: usize,
         source: usize,
     ) -> (Isometry3<f64>, Matrix6<f64>) {
-        let (of_target, of_source) = (&poses[target], &poses[source]);
-        let jacobians = relative_jacobians(of_target, of_source);
+        let pose = poses[target].inverse() * poses[source];
+        let jacobians = relative_jacobians(&poses[target], &pose);
         let mut covariance = Matrix6::zeros();
         for (a, left) in [target, source].into_iter().zip(&jacobians) {
             for (b, right) in [target, source].into_iter().zip(&jacobians) {
                 covariance += left * self.between(a, b) * right.transpose();
             }
         }
-        (of_target.inverse() * of_source, rigid_pose::symmetrised(&covariance))
+        (pose, rigid_pose::symmetrised(&covariance))
     }
 
     /// The whole matrix: six rows a station, then the shared parameters.

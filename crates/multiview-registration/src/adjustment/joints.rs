@@ -21,9 +21,10 @@ pub(crate) struct Joint {
 impl Joint {
     pub(crate) fn add_to(&self, equations: &mut Equations, poses: &[Isometry3<f64>]) {
         let [first, second] = self.stations.map(|station| poses[station]);
-        let off = pose_difference(&(first.inverse() * second), &self.first_from_second);
+        let relative = first.inverse() * second;
+        let off = pose_difference(&relative, &self.first_from_second);
         let row: RowVector6<f64> = self.along.transpose() / self.sigma_m;
-        let rows = relative_jacobians(&first, &second).map(|by| Rows::from_rows(&[row * by]));
+        let rows = relative_jacobians(&first, &relative).map(|by| Rows::from_rows(&[row * by]));
         let residual = DVector::from_element(1, -row.transpose().dot(&off));
         equations.add_rows(self.stations, [&rows[0], &rows[1]], None, &residual);
     }

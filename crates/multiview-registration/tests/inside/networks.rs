@@ -135,7 +135,7 @@ fn what_lies_beyond_a_joint_comes_where_no_rays_go_through_it() {
     let mut equations = Equations::new(STATIONS, Some(8), 0, 0);
     joint.add_to(&mut equations, right);
     let cofactors = equations.cofactors(network.held()).unwrap();
-    let by_second = relative_jacobians(&right[8], &right[9])[1];
+    let by_second = relative_jacobians(&right[8], &(right[8].inverse() * right[9]))[1];
     let of_joint = along.dot(&(by_second * cofactors.of(9) * by_second.transpose() * along));
     assert!((of_joint.sqrt() / joint.sigma_m - 1.0).abs() < 1e-3, "{of_joint} {joints:?}");
     let step = equations.step(&cofactors);

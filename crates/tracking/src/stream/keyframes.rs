@@ -15,6 +15,8 @@ use rigid_pose::Uncertain;
 pub(crate) const THUMBNAIL: [usize; 2] = [16, 12];
 /// Keyframes whose overlap with a frame is told.
 const CANDIDATES: usize = 4;
+/// Cosine of the largest angle between the axes of two cameras that can see the same from the same side.
+const LEAST_VIEW_COSINE: f64 = 0.3;
 
 /// Fraction of the nodes of the second frame that lie on the first, at a pose of the second, from about so many of them.
 pub(crate) type Overlap = fn(&OrganisedFrame, &OrganisedFrame, &Isometry3<f64>, usize) -> f64;
@@ -77,8 +79,13 @@ impl Keyframes {
         tried: impl Fn(usize) -> bool,
         overlap: Overlap,
     ) -> Vec<(f64, usize)> {
-        let tried = (0..self.list.len()).filter(|k| tried(*k));
-        let mut found: Vec<_> = tried.map(|k| (0.0, k, self.graph.relative(k, from) * from_from_camera)).collect();
+        let mut found = Vec::with_capacity(self.list.len());
+        for k in (0..self.list.len()).filter(|k| tried(*k)) {
+            let pose = self.graph.relative(k, from) * from_from_camera;
+            if pose.rotation.to_rotation_matrix()[(2, 2)] > LEAST_VIEW_COSINE {
+                found.push((0.0, k, pose));
+            }
+        }
         // Few points tell which ones are worth more.
         for most in [Agreement::NODES / 32, Agreement::NODES / 4] {
             for (share, k, pose) in &mut found {

@@ -96,7 +96,7 @@ pub(crate) fn with_locate<W: WithLocate>(frame: &OrganisedFrame, work: W) -> W::
 }
 
 /// What decides on pairs and their weights.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Rules {
     /// Added to the variance of every pair, for what is not yet aligned, m².
     pub extra_variance: f32,
@@ -146,6 +146,7 @@ pub(crate) fn node_at<L: Locate>(grid: &Grid, locate: L, p: [f32; 3]) -> Option<
 pub(crate) struct Moved<'a> {
     pub source: &'a OrganisedFrame,
     pub target: &'a OrganisedFrame,
+    rules: Rules,
     pose: SinglePose,
     centre: [f32; 3],
     per_radius: f32,
@@ -195,17 +196,23 @@ impl<'a> Moved<'a> {
         Self {
             source,
             target,
+            rules: Rules::default(),
             pose: SinglePose::new(pose),
             centre: [0, 1, 2].map(|i| centre[i] as f32),
             per_radius: (1.0 / radius_m) as f32,
         }
     }
 
+    /// The same with pairs decided on by these.
+    pub(crate) fn by(self, rules: Rules) -> Self {
+        Self { rules, ..self }
+    }
+
     /// The pairs of a block of source nodes.
     #[inline(always)]
-    pub(crate) fn pairs<L: Locate>(&self, locate: L, rules: &Rules, block: &Block) -> Pairs {
+    pub(crate) fn pairs<L: Locate>(&self, locate: L, block: &Block) -> Pairs {
         let (p, source_normal, planes, distances) = self.compared(locate, block);
-        let (centre, per_radius) = (self.centre, self.per_radius);
+        let (centre, per_radius, rules) = (self.centre, self.per_radius, self.rules);
         let (extra_variance, per_square_reach) = (rules.extra_variance, 1.0 / (rules.reach * rules.reach));
         let nothing = [0.0; BLOCK];
         let (mut accepted, mut met) = ([false; BLOCK], [false; BLOCK]);

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use rigid_pose::MotionEquations;
 
-use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, run_wide, with_locate};
+use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_locate};
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::BLOCK;
@@ -32,14 +32,9 @@ pub(crate) struct Normal {
 }
 
 /// Sums over blocks of the source.
-pub(crate) fn normal_equations(
-    moved: &Moved<'_>,
-    rules: &Rules,
-    blocks: &[Block],
-    chunks: &mut Vec<[f64; SUMS]>,
-) -> Normal {
+pub(crate) fn normal_equations(moved: &Moved<'_>, blocks: &[Block], chunks: &mut Vec<[f64; SUMS]>) -> Normal {
     chunks.resize(blocks.len().div_ceil(CHUNK), [0.0; SUMS]);
-    with_locate(moved.target, AllChunks { moved, rules, blocks, chunks });
+    with_locate(moved.target, AllChunks { moved, blocks, chunks });
     let mut total = [0.0; SUMS];
     for chunk in chunks.iter() {
         for (t, c) in total.iter_mut().zip(chunk) {
@@ -59,7 +54,6 @@ impl Normal {
 
 struct AllChunks<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     chunks: &'a mut [[f64; SUMS]],
 }
@@ -68,9 +62,9 @@ impl WithLocate for AllChunks<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        let (moved, rules) = (self.moved, self.rules);
+        let moved = self.moved;
         let work = |(sums, blocks): (&mut [f64; SUMS], &[Block])| {
-            run_wide(Chunk { moved, rules, blocks, sums }, locate);
+            run_wide(Chunk { moved, blocks, sums }, locate);
         };
         if self.chunks.len() < 2 * CHUNKS_PER_TASK {
             self.chunks.iter_mut().zip(self.blocks.chunks(CHUNK)).for_each(work);
@@ -83,7 +77,6 @@ impl WithLocate for AllChunks<'_, '_> {
 
 struct Chunk<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     sums: &'a mut [f64; SUMS],
 }
@@ -95,7 +88,7 @@ impl WithLocate for Chunk<'_, '_> {
     fn run<L: Locate>(self, locate: L) {
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];
         for block in self.blocks {
-            let pairs = self.moved.pairs(locate, self.rules, block);
+            let pairs = self.moved.pairs(locate, block);
             add(&mut lanes, &pairs, &derivatives(&pairs.lever, &pairs.normal));
         }
         *self.sums = [0.0; SUMS];
@@ -166,18 +159,12 @@ pub(crate) fn derivatives(lever: &[[f32; BLOCK]; 3], normal: &[[f32; BLOCK]; 3])
 
 /// Median of the absolute residuals, over their standard deviations, of about `most` nodes of the blocks; `None` where there
 /// are no pairs.
-pub(crate) fn median_residual(
-    moved: &Moved<'_>,
-    rules: &Rules,
-    blocks: &[Block],
-    most: usize,
-    scratch: &mut Vec<u32>,
-) -> Option<f64> {
+pub(crate) fn median_residual(moved: &Moved<'_>, blocks: &[Block], most: usize, scratch: &mut Vec<u32>) -> Option<f64> {
     // Spread evenly over the blocks.
     let step = (blocks.len() * BLOCK).div_ceil(most.max(1)).max(1);
     scratch.clear();
     scratch.resize(blocks.len().div_ceil(step) * BLOCK, NO_PAIR);
-    with_locate(moved.target, Sample { moved, rules, blocks, step, squares: scratch });
+    with_locate(moved.target, Sample { moved, blocks, step, squares: scratch });
     scratch.retain(|square| *square != NO_PAIR);
     median_of_bits(scratch).map(|square| f64::from(square.sqrt()))
 }
@@ -188,7 +175,6 @@ const NO_PAIR: u32 = u32::MAX;
 /// Squared residuals over their variances, as bits, of every `step`-th block.
 struct Sample<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     step: usize,
     squares: &'a mut [u32],
@@ -198,7 +184,7 @@ impl WithLocate for Sample<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        let (moved, rules, step) = (self.moved, self.rules, self.step);
+        let (moved, step) = (self.moved, self.step);
         let parts = self.squares.par_chunks_mut(2 * CHUNK * BLOCK).zip(self.blocks.par_chunks(2 * CHUNK * step));
         parts.for_each(|(squares, blocks)| {
             let mut places = squares.chunks_exact_mut(BLOCK);
@@ -210,15 +196,15 @@ impl WithLocate for Sample<'_, '_> {
                     }
                 }
             };
-            run_wide(Visit { moved, rules, blocks, step, work }, locate);
+            run_wide(Visit { moved, blocks, step, work }, locate);
         });
     }
 }
 
 /// Nodes that fall on target planes, and how many of them are accepted.
-pub fn agreement(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> (usize, usize) {
+pub(crate) fn agreement(moved: &Moved<'_>, blocks: &[Block]) -> (usize, usize) {
     let (mut met, mut accepted) = (0, 0);
-    visit(moved, rules, blocks, |pairs| {
+    visit(moved, blocks, |pairs| {
         met += pairs.met.iter().filter(|m| **m).count();
         accepted += pairs.weight.iter().filter(|w| **w > 0.0).count();
     });
@@ -226,14 +212,13 @@ pub fn agreement(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> (usize, 
 }
 
 /// Calls a function with the pairs of each block.
-pub(crate) fn visit(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], work: impl FnMut(&Pairs)) {
-    with_locate(moved.target, Visit { moved, rules, blocks, step: 1, work });
+pub(crate) fn visit(moved: &Moved<'_>, blocks: &[Block], work: impl FnMut(&Pairs)) {
+    with_locate(moved.target, Visit { moved, blocks, step: 1, work });
 }
 
 /// Calls a function with the pairs of every `step`-th block.
 struct Visit<'a, 'b, F> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     step: usize,
     work: F,
@@ -245,7 +230,7 @@ impl<F: FnMut(&Pairs)> WithLocate for Visit<'_, '_, F> {
     #[inline(always)]
     fn run<L: Locate>(mut self, locate: L) {
         for block in self.blocks.iter().step_by(self.step) {
-            (self.work)(&self.moved.pairs(locate, self.rules, block));
+            (self.work)(&self.moved.pairs(locate, block));
         }
     }
 }

@@ -55,7 +55,8 @@ impl<'a> Frames<'a> {
     /// The source where a track has it, and about what its motions are.
     pub(crate) fn moved(self, track: &Track) -> (Moved<'a>, Centred) {
         let frame = self.source.centred(&track.pose);
-        (Moved::new(self.source, self.target, &track.pose, &frame.centre, frame.radius_m), frame)
+        let moved = Moved::new(self.source, self.target, &track.pose, &frame.centre, frame.radius_m);
+        (moved.by(track.rules), frame)
     }
 }
 

@@ -128,7 +128,7 @@ impl FrameAligner {
         let radius = frames.target.points.radius_m.max(frames.radius_m());
         track.rules.extra_variance = (radius * radius) as f32;
         let moved = frames.moved(track);
-        let median = median_residual(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch)
+        let median = median_residual(&moved.0, blocks, SAMPLE, &mut self.scratch)
             .ok_or_else(|| Self::too_few(0, frames.source.len(), track))?;
         let scale = SIGMA_OF_MAD * median * radius;
         track.rules.extra_variance = (scale * scale) as f32;
@@ -163,7 +163,7 @@ impl FrameAligner {
     /// Lowers the variance of what is not aligned to what the residuals show.
     fn narrow(&mut self, track: &mut Track, frames: Frames<'_>, blocks: &[Block]) {
         let (moved, _) = frames.moved(track);
-        let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
+        let median = median_residual(&moved, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
         let square = (SIGMA_OF_MAD * median).powi(2) as f32;
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
     }
@@ -177,7 +177,7 @@ impl FrameAligner {
         damping: f64,
     ) -> Result<(f64, Centred)> {
         let (moved, frame) = frames.moved(track);
-        let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
+        let normal = normal_equations(&moved, blocks, &mut self.chunks);
         if normal.pairs < FEWEST_PAIRS {
             return Err(Self::too_few(normal.pairs, frames.source.len(), track).into());
         }
@@ -193,7 +193,7 @@ impl FrameAligner {
     pub(crate) fn verdict(&mut self, track: &Track, frames: Frames<'_>, blocks: &[Block]) -> Result<Verdict> {
         let (moved, frame) = frames.moved(track);
         let limit_m = self.options.max_motion_sigma_m.unwrap_or(FrameAlignmentOptions::OPEN * frame.radius_m);
-        Verdict::new(&moved, &track.rules, blocks, limit_m, &mut self.cells)
+        Verdict::new(&moved, blocks, limit_m, &mut self.cells)
     }
 
     fn result(&mut self, track: &Track, frames: Frames<'_>, stop: StopReason) -> Result<IcpResult> {

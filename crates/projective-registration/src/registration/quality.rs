@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, Matrix6, Vector6};
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, run_wide, with_locate};
+use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_locate};
 use crate::partners::sums::{self, Normal, derivatives};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};
@@ -46,14 +46,8 @@ pub(crate) struct Verdict {
 
 impl Verdict {
     /// Judges the blocks of the source; motions with a predicted sigma above `max_sigma_m` are undetermined.
-    pub(crate) fn new(
-        moved: &Moved<'_>,
-        rules: &Rules,
-        blocks: &[Block],
-        max_sigma_m: f64,
-        cells: &mut Vec<Cell>,
-    ) -> Result<Self> {
-        let (cells, normal) = fill(moved, rules, blocks, cells);
+    pub(crate) fn new(moved: &Moved<'_>, blocks: &[Block], max_sigma_m: f64, cells: &mut Vec<Cell>) -> Result<Self> {
+        let (cells, normal) = fill(moved, blocks, cells);
         let information = symmetric(&cells.iter().fold([0.0; 21], |mut sum, cell| {
             sum.iter_mut().zip(&cell[6..]).for_each(|(s, c)| *s += c);
             sum
@@ -63,7 +57,7 @@ impl Verdict {
             clustered(cells) * (used as f64 / (used as f64 - 6.0))
         } else {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            independent_scores(moved, rules, blocks) * (normal.pairs as f64 / used.max(1) as f64)
+            independent_scores(moved, blocks) * (normal.pairs as f64 / used.max(1) as f64)
         };
         // Frames that are copies of each other leave no residuals: their noise is still that of their nodes.
         let missing = (LEAST_SCORE - score.trace() / normal.equations.matrix.trace()).max(0.0);
@@ -142,9 +136,9 @@ fn form(upper: &[f64], v: &Vector6<f64>) -> f64 {
 }
 
 /// Covariance of the summed score of pairs that share nothing.
-fn independent_scores(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> Matrix6<f64> {
+fn independent_scores(moved: &Moved<'_>, blocks: &[Block]) -> Matrix6<f64> {
     let mut sums = [0.0; 21];
-    sums::visit(moved, rules, blocks, |pairs| {
+    sums::visit(moved, blocks, |pairs| {
         let rows = derivatives(&pairs.lever, &pairs.normal);
         let mut k = 0;
         for r in 0..6 {
@@ -163,12 +157,12 @@ fn independent_scores(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> Mat
 }
 
 /// Sums over the cells, and the normal equations.
-fn fill<'c>(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], cells: &'c mut Vec<Cell>) -> (&'c [Cell], Normal) {
+fn fill<'c>(moved: &Moved<'_>, blocks: &[Block], cells: &'c mut Vec<Cell>) -> (&'c [Cell], Normal) {
     let count = moved.source.grid.cell_count;
     cells.clear();
     cells.resize(PARTS * count, [0.0; SUMS]);
     let mut parts = [[0.0; sums::SUMS]; PARTS];
-    with_locate(moved.target, Fill { moved, rules, blocks, cells, parts: &mut parts });
+    with_locate(moved.target, Fill { moved, blocks, cells, parts: &mut parts });
     let (first, others) = cells.split_at_mut(count);
     for part in others.chunks(count) {
         for (cell, other) in first.iter_mut().zip(part) {
@@ -181,7 +175,6 @@ fn fill<'c>(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], cells: &'c mut V
 
 struct Fill<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     cells: &'a mut [Cell],
     parts: &'a mut [[f64; sums::SUMS]; PARTS],
@@ -191,19 +184,18 @@ impl WithLocate for Fill<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        let (moved, rules) = (self.moved, self.rules);
+        let moved = self.moved;
         let size = self.blocks.len().div_ceil(PARTS).max(1);
         let sums = self.cells.par_chunks_mut(self.cells.len() / PARTS).zip(self.parts.par_iter_mut());
         let blocks = self.blocks.par_chunks(size).zip(moved.source.grid.cells.par_chunks(size));
         sums.zip(blocks).for_each(|((cells, totals), (blocks, cell_of))| {
-            run_wide(Part { moved, rules, blocks, cell_of, cells, totals }, locate);
+            run_wide(Part { moved, blocks, cell_of, cells, totals }, locate);
         });
     }
 }
 
 struct Part<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     /// Cells of the nodes.
     cell_of: &'a [[u16; BLOCK]],
@@ -220,7 +212,7 @@ impl WithLocate for Part<'_, '_> {
         for (blocks, cells) in self.blocks.chunks(sums::CHUNK).zip(self.cell_of.chunks(sums::CHUNK)) {
             let mut totals = [[0.0; BLOCK]; sums::SUMS];
             for (block, cell_of) in blocks.iter().zip(cells) {
-                let pairs = self.moved.pairs(locate, self.rules, block);
+                let pairs = self.moved.pairs(locate, block);
                 self.add(&mut run, &mut totals, &pairs, cell_of);
             }
             sums::hand_over(self.totals, &totals);

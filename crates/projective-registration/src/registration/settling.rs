@@ -83,12 +83,12 @@ impl FrameAligner {
 
     /// Sets the reach of the kernel from the residuals.
     fn rescale(&mut self, track: &mut Track, frames: Frames<'_>, first: bool) {
-        let (moved, _) = frames.moved(track);
         if first {
             track.rules.reach = 10.0 * BIWEIGHT;
         }
+        let (moved, _) = frames.moved(track);
         let blocks = frames.all_blocks();
-        let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
+        let median = median_residual(&moved, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
         let scale = (SIGMA_OF_MAD * median).max(0.1) as f32;
         track.rules.reach = BIWEIGHT * scale;
     }

@@ -71,8 +71,8 @@ impl FrameAligner {
 fn share_of_agreement(track: &Track, frames: Frames<'_>, blocks: &[Block]) -> f64 {
     let (moved, frame) = frames.moved(track);
     let tolerance = (AGREEMENT_TOLERANCE * frame.radius_m) as f32;
-    let rules = Rules { extra_variance: tolerance * tolerance, reach: 1.0, ..track.rules };
-    let (met, accepted) = agreement(&moved, &rules, blocks);
+    let rules = Rules { extra_variance: tolerance * tolerance, reach: 1.0 };
+    let (met, accepted) = agreement(&moved.by(rules), blocks);
     // Few points in sight agree easily.
     let needed = FEWEST_IN_SIGHT * (blocks.len() * BLOCK) as f64;
     accepted as f64 / (met as f64).max(needed)

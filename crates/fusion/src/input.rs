@@ -101,7 +101,7 @@ impl Registered<'_> {
             |what, found| if found == count { Ok(()) } else { Err(Error::Length { what, expected: count, found }) };
         length("frames", self.frames.len())?;
         length("amplitudes", self.amplitudes.map_or(count, <[f64]>::len))?;
-        let wrong = |points: &[Point3<f64>]| points.iter().position(|point| !point_cloud::is_usable(point));
+        let wrong = |points: &[Point3<f64>]| points.iter().position(|point| !rigid_pose::is_usable(point));
         if let Some(index) = wrong(self.points) {
             return Err(Error::NonFinite { what: "point", index });
         }

@@ -75,7 +75,7 @@ pub struct CoarseAlignment {
 ///
 /// # Errors
 /// [`Error::NoAlignment`] where no pose passes: no overlap, too little structure, or two poses that fit equally well.
-/// [`Error::InvalidOption`].
+/// [`InputError::InvalidOption`](rigid_pose::InputError::InvalidOption).
 pub fn align_without_guess(
     source: &FeatureCloud,
     target: &FeatureCloud,

@@ -1,8 +1,9 @@
 //! What can be chosen in an alignment without a guess.
 
 use nalgebra::Point3;
+use rigid_pose::{require_option, require_points};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// From where a cloud was seen: the side that its normals point to, and what space was looked through.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -107,34 +108,26 @@ impl CoarseOptions {
             ("length_m", self.shared_error.map_or(1.0, |shared| shared.length_m), f64::MAX, "positive and finite"),
         ];
         for (name, value, largest, domain) in lengths {
-            if !(value > 0.0 && value <= largest) {
-                return Err(Error::InvalidOption { name, value, domain });
-            }
+            require_option(name, value, domain, |value| value > 0.0 && value <= largest)?;
         }
         for (name, value) in [
             ("min_overlap", self.min_overlap),
             ("min_inside", self.min_inside),
             ("min_determined", self.min_determined),
         ] {
-            if !(0.0..=1.0).contains(&value) {
-                return Err(Error::InvalidOption { name, value, domain: "between 0 and 1" });
-            }
+            require_option(name, value, "between 0 and 1", |value| (0.0..=1.0).contains(&value))?;
         }
         let counts = [
             ("max_features", self.max_features, 10, 50_000, "between 10 and 50 000"),
             ("max_hypotheses", self.max_hypotheses, 1, 10_000, "between 1 and 10 000"),
         ];
         for (name, value, least, most, domain) in counts {
-            if !(least..=most).contains(&value) {
-                return Err(Error::InvalidOption { name, value: value as f64, domain });
-            }
+            require_option(name, value as f64, domain, |_| (least..=most).contains(&value))?;
         }
         let sigma_m = self.shared_error.map_or(0.0, |shared| shared.sigma_m);
-        if !(sigma_m >= 0.0 && sigma_m.is_finite()) {
-            return Err(Error::InvalidOption { name: "sigma_m", value: sigma_m, domain: "finite and not negative" });
-        }
+        require_option("sigma_m", sigma_m, "finite and not negative", |sigma| sigma >= 0.0 && sigma.is_finite())?;
         if let Viewpoint::At(point) = self.viewpoint {
-            point_cloud::check_points("viewpoint", &[point])?;
+            require_points("viewpoint", &[point])?;
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ use global_registration::{
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
+use rigid_pose::InputError;
 
 /// A painted wall in the plane y = 2 and a painted floor at z = 0: amplitude and points of a camera.
 fn frame(camera: &Pinhole, world_from_camera: &Isometry3<f64>) -> (Vec<f32>, Vec<[f64; 3]>) {
@@ -112,21 +113,39 @@ fn the_range_does_not_change_a_descriptor_by_itself() {
 fn bad_frames_are_named() {
     let options = AmplitudeFeatureOptions::default();
     let nan = vec![[f64::NAN; 3]; 400];
-    assert!(matches!(amplitude_features(&[1.0; 9], &nan, 20, 20, &options), Err(Error::LengthMismatch { .. })));
-    assert!(matches!(amplitude_features(&[1.0; 400], &nan, 20, 20, &options), Err(Error::TooFewPoints { .. })));
-    assert!(matches!(amplitude_features(&[], &[], 0, 0, &options), Err(Error::TooFewPoints { .. })));
+    assert!(matches!(
+        amplitude_features(&[1.0; 9], &nan, 20, 20, &options),
+        Err(Error::Input(InputError::LengthMismatch { .. }))
+    ));
+    assert!(matches!(
+        amplitude_features(&[1.0; 400], &nan, 20, 20, &options),
+        Err(Error::Input(InputError::TooFewPoints { .. }))
+    ));
+    assert!(matches!(amplitude_features(&[], &[], 0, 0, &options), Err(Error::Input(InputError::TooFewPoints { .. }))));
     let flat = vec![[0.0, 0.0, -1.0]; 400];
     assert!(amplitude_features(&[1.0; 400], &flat, 20, 20, &options).unwrap().is_empty());
     assert!(amplitude_features(&[f32::NAN; 400], &flat, 20, 20, &options).is_err());
     let bad = AmplitudeFeatureOptions { min_contrast: f64::NAN, ..options };
-    assert!(matches!(amplitude_features(&[1.0; 400], &flat, 20, 20, &bad), Err(Error::InvalidOption { .. })));
+    assert!(matches!(
+        amplitude_features(&[1.0; 400], &flat, 20, 20, &bad),
+        Err(Error::Input(InputError::InvalidOption { .. }))
+    ));
     assert!(Features::new(vec![Point3::origin()], &[f32::NAN], 1).is_err());
     assert!(Features::new(vec![Point3::origin()], &[1.0], 0).is_err());
     let one = Features::new(vec![Point3::origin()], &[1.0], 1).unwrap();
     let wide = Features::new(vec![Point3::origin()], &[1.0, 0.0], 2).unwrap();
     let (identity, sparse) = (Isometry3::identity(), SparseIcpOptions::new(1.0, 0.1));
-    assert!(matches!(align_features(&one, &wide, &identity, &sparse), Err(Error::LengthMismatch { .. })));
-    assert!(matches!(align_features(&one, &one, &identity, &sparse), Err(Error::TooFewCorrespondences { .. })));
+    assert!(matches!(
+        align_features(&one, &wide, &identity, &sparse),
+        Err(Error::Input(InputError::LengthMismatch { .. }))
+    ));
+    assert!(matches!(
+        align_features(&one, &one, &identity, &sparse),
+        Err(Error::Input(InputError::TooFewCorrespondences { .. }))
+    ));
     let none = SparseIcpOptions::new(0.1, 1.0);
-    assert!(matches!(align_features(&one, &one, &identity, &none), Err(Error::InvalidOption { .. })));
+    assert!(matches!(
+        align_features(&one, &one, &identity, &none),
+        Err(Error::Input(InputError::InvalidOption { .. }))
+    ));
 }

@@ -7,6 +7,7 @@ use global_registration::{CoarseOptions, FeatureCloud, SharedError, Viewpoint, a
 use nalgebra::{Isometry3, Point3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
+use rigid_pose::InputError;
 
 fn made(points: Vec<Point3<f64>>) -> Result<FeatureCloud, Error> {
     FeatureCloud::new(&Cloud::new(points), &CoarseOptions::default())
@@ -21,20 +22,20 @@ fn frames() -> ([Vec<[f64; 3]>; 2], Isometry3<f64>) {
 
 #[test]
 fn clouds_without_extent_are_named() {
-    assert!(matches!(made(vec![]), Err(Error::Cloud(CloudError::Empty { .. }))));
+    assert!(matches!(made(vec![]), Err(Error::Cloud(CloudError::Input(InputError::Empty { .. })))));
     assert!(matches!(
         made(vec![Point3::new(f64::NAN, 0.0, 0.0); 20]),
-        Err(Error::Cloud(CloudError::NonFinite { index: 0, .. }))
+        Err(Error::Cloud(CloudError::Input(InputError::NonFinite { index: 0, .. })))
     ));
     let unseen = Cloud::from_frame(&[[f64::NAN; 3]; 400], None, None).unwrap();
     assert!(matches!(
         FeatureCloud::new(&unseen, &CoarseOptions::default()),
-        Err(Error::Cloud(CloudError::Empty { .. }))
+        Err(Error::Cloud(CloudError::Input(InputError::Empty { .. })))
     ));
-    assert!(matches!(made(vec![Point3::new(0.0, 0.0, -1.0)]), Err(Error::TooFewPoints { .. })));
-    assert!(matches!(made(vec![Point3::origin(); 50]), Err(Error::TooFewPoints { .. })));
+    assert!(matches!(made(vec![Point3::new(0.0, 0.0, -1.0)]), Err(Error::Input(InputError::TooFewPoints { .. }))));
+    assert!(matches!(made(vec![Point3::origin(); 50]), Err(Error::Input(InputError::TooFewPoints { .. }))));
     let far = vec![Point3::new(0.0, 0.0, 0.0), Point3::new(1e99, 0.0, 0.0), Point3::new(0.0, -1e99, 1.0)];
-    assert!(matches!(made(far), Err(Error::TooFewPoints { .. })));
+    assert!(matches!(made(far), Err(Error::Input(InputError::TooFewPoints { .. }))));
 }
 
 #[test]
@@ -103,8 +104,8 @@ fn options_outside_their_domain_are_named() {
         CoarseOptions { shared_error: Some(SharedError { sigma_m: -1.0, length_m: 1.0 }), ..options.clone() },
         CoarseOptions { shared_error: Some(SharedError { sigma_m: 1.0, length_m: 0.0 }), ..options.clone() },
     ] {
-        assert!(matches!(made(&bad), Err(Error::InvalidOption { .. })), "{bad:?}");
+        assert!(matches!(made(&bad), Err(Error::Input(InputError::InvalidOption { .. }))), "{bad:?}");
     }
     let unseen = CoarseOptions { viewpoint: Viewpoint::At(Point3::new(0.0, f64::NAN, 0.0)), ..options };
-    assert!(matches!(made(&unseen), Err(Error::Cloud(CloudError::NonFinite { .. }))));
+    assert!(matches!(made(&unseen), Err(Error::Input(InputError::NonFinite { .. }))));
 }

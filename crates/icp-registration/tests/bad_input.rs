@@ -5,6 +5,7 @@ use icp_registration::{Error, IcpOptions, IcpTarget, Metric, RobustKernel, Selec
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
+use rigid_pose::InputError;
 
 fn good() -> Cloud {
     cloud(&Scene::furnished(), &Pinhole { width: 44, height: 36, focal_px: 38.0 }, &pose(), 1.0, 1)
@@ -48,23 +49,29 @@ fn clouds_that_cannot_be_aligned() {
         let run = |source: &Cloud, target: &Cloud| align(source, target, &id, &options);
         assert!(matches!(
             run(&Cloud::default(), &good),
-            Err(Error::Cloud(CloudError::Empty { what: "the source cloud" }))
+            Err(Error::Cloud(CloudError::Input(InputError::Empty { what: "the source cloud" })))
         ));
         assert!(matches!(
             run(&good, &Cloud::default()),
-            Err(Error::Cloud(CloudError::Empty { what: "the target cloud" }))
+            Err(Error::Cloud(CloudError::Input(InputError::Empty { what: "the target cloud" })))
         ));
         let nan = Cloud::new(vec![Point3::new(f64::NAN, 0.0, 0.0); 30]);
-        assert!(matches!(run(&nan, &good), Err(Error::Cloud(CloudError::NonFinite { index: 0, .. }))));
-        assert!(matches!(run(&good, &nan), Err(Error::Cloud(CloudError::NonFinite { index: 0, .. }))));
+        assert!(matches!(
+            run(&nan, &good),
+            Err(Error::Cloud(CloudError::Input(InputError::NonFinite { index: 0, .. })))
+        ));
+        assert!(matches!(
+            run(&good, &nan),
+            Err(Error::Cloud(CloudError::Input(InputError::NonFinite { index: 0, .. })))
+        ));
         let one = Cloud::new(vec![Point3::new(0.0, 0.0, -1.0)]);
-        assert!(matches!(run(&one, &good), Err(Error::TooFewCorrespondences { .. })));
+        assert!(matches!(run(&one, &good), Err(Error::Input(InputError::TooFewCorrespondences { .. }))));
         assert!(
-            matches!(run(&good, &one), Err(Error::TooFewCorrespondences { .. }))
+            matches!(run(&good, &one), Err(Error::Input(InputError::TooFewCorrespondences { .. })))
                 || options.metric == Metric::PointToPoint
         );
         let far = good.transformed(&Isometry3::translation(0.0, 1e6, 0.0));
-        assert!(matches!(run(&far, &good), Err(Error::TooFewCorrespondences { .. })));
+        assert!(matches!(run(&far, &good), Err(Error::Input(InputError::TooFewCorrespondences { .. }))));
     }
 }
 
@@ -77,7 +84,9 @@ fn lines_and_equal_points_are_told_from_a_pose() {
         for cloud in [&line, &equal] {
             match align(cloud, cloud, &id, &options) {
                 Ok(result) => assert!(!result.degenerate.is_empty() && !result.is_trustworthy()),
-                Err(error) => assert!(matches!(error, Error::TooFewCorrespondences { .. }), "{error}"),
+                Err(error) => {
+                    assert!(matches!(error, Error::Input(InputError::TooFewCorrespondences { .. })), "{error}");
+                }
             }
         }
     }
@@ -90,25 +99,25 @@ fn planes_of_another_length_and_bad_sigmas() {
     let short = Cloud { normals: Some(vec![Vector3::z(); 3]), ..good.clone() };
     assert!(matches!(
         align(&short, &good, &id, &options),
-        Err(Error::Cloud(CloudError::LengthMismatch { what: "normals", .. }))
+        Err(Error::Cloud(CloudError::Input(InputError::LengthMismatch { what: "normals", .. })))
     ));
     let short = Cloud { sigma: Some(vec![1.0; 3]), ..good.clone() };
     assert!(matches!(
         align(&good, &short, &id, &options),
-        Err(Error::Cloud(CloudError::LengthMismatch { what: "sigma", .. }))
+        Err(Error::Cloud(CloudError::Input(InputError::LengthMismatch { what: "sigma", .. })))
     ));
     let mut sigma = vec![1e-3; good.len()];
     sigma[4] = 0.0;
     let zero = Cloud { sigma: Some(sigma), ..good.clone() };
     assert!(matches!(
         align(&zero, &good, &id, &options),
-        Err(Error::Cloud(CloudError::NotPositive { what: "sigma", index: 4, .. }))
+        Err(Error::Cloud(CloudError::Input(InputError::NotPositive { what: "sigma", index: 4, .. })))
     ));
     let unknown = Cloud { sigma: Some(vec![f64::NAN; good.len()]), ..good.clone() };
     assert!(align(&unknown, &good, &id, &options).unwrap().rms_m.is_finite());
     assert!(matches!(
         Cloud::from_frame(&[[0.0; 3]; 2], None, Some(&[1.0])),
-        Err(point_cloud::Error::LengthMismatch { .. })
+        Err(point_cloud::Error::Input(InputError::LengthMismatch { .. }))
     ));
 }
 
@@ -128,10 +137,16 @@ fn options_and_guesses_outside_their_domain() {
         IcpOptions { selection: Selection::EveryNth(0), ..default() },
         IcpOptions { selection: Selection::NormalSpace(0), ..default() },
     ] {
-        assert!(matches!(align(&good, &good, &id, &options), Err(Error::InvalidOption { .. })), "{options:?}");
+        assert!(
+            matches!(align(&good, &good, &id, &options), Err(Error::Input(InputError::InvalidOption { .. }))),
+            "{options:?}"
+        );
     }
     let nan = Isometry3::translation(f64::NAN, 0.0, 0.0);
-    assert!(matches!(align(&good, &good, &nan, &default()), Err(Error::NonFinite { what: "the guess", .. })));
+    assert!(matches!(
+        align(&good, &good, &nan, &default()),
+        Err(Error::Input(InputError::NonFinite { what: "the guess", .. }))
+    ));
 }
 
 #[test]

@@ -8,6 +8,7 @@ use icp_registration::{Error, MotionKind, Registration};
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
+use rigid_pose::InputError;
 use rigid_pose::pose_difference;
 
 fn room_mesh() -> TriangleMesh {
@@ -73,11 +74,11 @@ fn a_plate_leaves_three_motions_open_without_normals_of_the_points() {
 fn meshes_that_are_none_are_refused() {
     let corners =
         [Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(2.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
-    assert!(matches!(TriangleMesh::new(&corners, &[]), Err(Error::Empty { .. })));
-    assert!(matches!(TriangleMesh::new(&corners, &[[0, 1, 2]]), Err(Error::Empty { .. })));
+    assert!(matches!(TriangleMesh::new(&corners, &[]), Err(Error::Input(InputError::Empty { .. }))));
+    assert!(matches!(TriangleMesh::new(&corners, &[[0, 1, 2]]), Err(Error::Input(InputError::Empty { .. }))));
     assert!(matches!(TriangleMesh::new(&corners, &[[0, 1, 4]]), Err(Error::NoSuchVertex { vertex: 4, count: 4 })));
     let nan = [Point3::origin(), Point3::new(f64::NAN, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
-    assert!(matches!(TriangleMesh::new(&nan, &[[0, 1, 2]]), Err(Error::Cloud(CloudError::NonFinite { index: 1, .. }))));
+    assert!(matches!(TriangleMesh::new(&nan, &[[0, 1, 2]]), Err(Error::Input(InputError::NonFinite { index: 1, .. }))));
     let mesh = TriangleMesh::new(&corners, &[[0, 1, 2], [0, 1, 3]]).unwrap();
     assert_eq!((mesh.len(), mesh.is_empty()), (1, false));
     let (point, normal) = mesh.closest(&Point3::new(0.2, 0.3, 0.5), 1.0).unwrap().unwrap();
@@ -85,6 +86,6 @@ fn meshes_that_are_none_are_refused() {
     assert!(mesh.closest(&Point3::new(0.2, 0.3, 0.5), 0.4).unwrap().is_none());
     assert!(matches!(
         mesh.closest(&Point3::new(f64::NAN, 0.0, 0.0), 1.0),
-        Err(Error::Cloud(CloudError::NonFinite { .. }))
+        Err(Error::Input(InputError::NonFinite { .. }))
     ));
 }

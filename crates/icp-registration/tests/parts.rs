@@ -14,6 +14,7 @@ use icp_registration::{
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
+use rigid_pose::InputError;
 use rigid_pose::RotationMethod;
 
 struct Setting {
@@ -107,7 +108,7 @@ fn projection_in_place_of_a_search() {
     registration.levels.last_limit_m = Some(0.15);
     check("projective", &s, &registration, 6.0);
     let wrong = Projective::new(&target, &pair.target.0[1..], camera.width, camera.height, pixel);
-    assert!(matches!(wrong, Err(Error::LengthMismatch { .. })));
+    assert!(matches!(wrong, Err(Error::Input(InputError::LengthMismatch { .. }))));
 }
 
 #[test]

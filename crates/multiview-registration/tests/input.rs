@@ -4,6 +4,7 @@ use multiview_registration::{Datum, Start, StationRegistrationOptions, register_
 use nalgebra::{Isometry3, Point3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
+use rigid_pose::InputError;
 
 fn plane() -> Cloud {
     Cloud::new((0..400).map(|i| Point3::new(f64::from(i % 20) * 0.02, f64::from(i / 20) * 0.02, -1.0)).collect())
@@ -18,18 +19,30 @@ fn what_is_wrong_is_named() {
     let options = StationRegistrationOptions::default();
     let (two, poses) = ([plane(), plane()], [Isometry3::identity(); 2]);
     let none: [Cloud; 0] = [];
-    assert!(matches!(error(&none, Start::Poses(&[]), Datum::Station(0), &options), Error::Empty { .. }));
+    assert!(matches!(
+        error(&none, Start::Poses(&[]), Datum::Station(0), &options),
+        Error::Input(InputError::Empty { .. })
+    ));
     let short = Start::Poses(&poses[..1]);
-    assert!(matches!(error(&two, short, Datum::Station(0), &options), Error::LengthMismatch { .. }));
+    assert!(matches!(error(&two, short, Datum::Station(0), &options), Error::Input(InputError::LengthMismatch { .. })));
     let start = Start::Poses(&poses);
     assert!(matches!(error(&two, start, Datum::Station(2), &options), Error::NoSuchStation { station: 2, count: 2 }));
     let mut nan = poses;
     nan[1].translation.vector.x = f64::NAN;
-    assert!(matches!(error(&two, Start::Poses(&nan), Datum::Station(0), &options), Error::NonFinite { index: 1, .. }));
+    assert!(matches!(
+        error(&two, Start::Poses(&nan), Datum::Station(0), &options),
+        Error::Input(InputError::NonFinite { index: 1, .. })
+    ));
     let holed = [plane(), Cloud::new(vec![Point3::new(f64::NAN, 0.0, 0.0)])];
-    assert!(matches!(error(&holed, start, Datum::Station(0), &options), Error::Cloud(CloudError::NonFinite { .. })));
+    assert!(matches!(
+        error(&holed, start, Datum::Station(0), &options),
+        Error::Cloud(CloudError::Input(InputError::NonFinite { .. }))
+    ));
     let empty = [plane(), Cloud::default()];
-    assert!(matches!(error(&empty, start, Datum::Station(0), &options), Error::Cloud(CloudError::Empty { .. })));
+    assert!(matches!(
+        error(&empty, start, Datum::Station(0), &options),
+        Error::Cloud(CloudError::Input(InputError::Empty { .. }))
+    ));
 }
 
 #[test]
@@ -43,7 +56,7 @@ fn options_outside_their_domain_are_refused() {
     ];
     for options in &wrong {
         let found = error(&two, Start::Poses(&poses), Datum::Station(0), options);
-        assert!(matches!(found, Error::InvalidOption { .. }), "{options:?}: {found}");
+        assert!(matches!(found, Error::Input(InputError::InvalidOption { .. })), "{options:?}: {found}");
     }
 }
 
@@ -58,7 +71,7 @@ fn points_that_form_no_surface_are_too_few() {
             Datum::Station(0),
             &StationRegistrationOptions::default(),
         );
-        assert!(matches!(found, Error::TooFewPoints { .. }), "{found}");
+        assert!(matches!(found, Error::Input(InputError::TooFewPoints { .. })), "{found}");
     }
 }
 

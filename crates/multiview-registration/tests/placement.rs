@@ -6,6 +6,7 @@ use multiview_registration::{
     Datum, Placement, Placements, Start, StationRegistrationOptions, judge_placements, register_stations,
 };
 use nalgebra::{Isometry3, Translation3};
+use rigid_pose::InputError;
 
 fn doubtful(found: &Placements) -> Vec<usize> {
     found.doubtful().collect()
@@ -90,7 +91,10 @@ fn few_stations_are_not_judged() {
     assert!(found.stations.iter().all(|station| station.verdict == Placement::Unjudged));
     assert!(found.pairs.iter().all(|pair| pair.target < pair.source));
     let short = judge_placements(&clouds, &poses[..3]).unwrap_err();
-    assert!(matches!(short, Error::LengthMismatch { .. }));
+    assert!(matches!(short, Error::Input(InputError::LengthMismatch { .. })));
     poses[2].translation.vector.x = f64::NAN;
-    assert!(matches!(judge_placements(&clouds, &poses).unwrap_err(), Error::NonFinite { index: 2, .. }));
+    assert!(matches!(
+        judge_placements(&clouds, &poses).unwrap_err(),
+        Error::Input(InputError::NonFinite { index: 2, .. })
+    ));
 }

@@ -6,6 +6,7 @@ use multiview_registration::{Datum, Error, MeasuredTurn, Start, StationRegistrat
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
+use rigid_pose::InputError;
 
 /// Standard deviation of a turn about each axis, radian: a phone's gyroscope over a second, its bias known from a rest.
 const TURN_RAD: f64 = 3e-4;
@@ -112,6 +113,6 @@ fn turns_of_stations_that_are_not_there_are_refused() {
         |turn| turn.covariance[(0, 0)] = f64::NAN,
         |turn| turn.second = turn.first,
     ] {
-        assert!(matches!(with(change), Error::NonFinite { .. }));
+        assert!(matches!(with(change), Error::Input(InputError::NonFinite { .. })));
     }
 }

@@ -1,9 +1,9 @@
 //! A cloud of points with what is known of each.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use rigid_pose::{InputError, is_usable, require_length, require_points};
 
 use crate::error::{Error, Result};
-use crate::neighbours::{check_points, is_usable};
 
 /// Points at the origin that a cloud may hold by chance, and the share of them.
 const MOST_AT_ORIGIN: usize = 100;
@@ -34,10 +34,10 @@ impl Cloud {
     /// zeros written for no range), are left out, together with their normal and sigma.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] where the planes differ in length.
+    /// [`InputError::LengthMismatch`] where the planes differ in length.
     pub fn from_frame(points: &[[f64; 3]], normals: Option<&[Vector3<f64>]>, sigma: Option<&[f32]>) -> Result<Self> {
-        check_length("normals", points.len(), normals.map(<[_]>::len))?;
-        check_length("sigma", points.len(), sigma.map(<[_]>::len))?;
+        require_length("normals", points.len(), normals.map(<[_]>::len))?;
+        require_length("sigma", points.len(), sigma.map(<[_]>::len))?;
         let keep: Vec<usize> = (0..points.len())
             .filter(|&i| is_usable(&Point3::from(points[i])) && points[i].iter().any(|c| c.abs() > 0.0))
             .collect();
@@ -73,31 +73,29 @@ impl Cloud {
     /// that are not positive (NaN passes: unknown). `what` names the cloud.
     ///
     /// # Errors
-    /// [`Error::Empty`], [`Error::NonFinite`], [`Error::Unmeasured`], [`Error::LengthMismatch`], [`Error::NotPositive`].
+    /// [`InputError::Empty`], [`InputError::NonFinite`], [`Error::Unmeasured`], [`InputError::LengthMismatch`], [`InputError::NotPositive`].
     pub fn validate(&self, what: &'static str) -> Result<()> {
         if self.is_empty() {
-            return Err(Error::Empty { what });
+            return Err(InputError::Empty { what }.into());
         }
-        check_points(what, &self.points)?;
+        require_points(what, &self.points)?;
         let (found, of) = (self.points.iter().filter(|p| **p == Point3::origin()).count(), self.len());
         if found > MOST_AT_ORIGIN && found as f64 > LARGEST_SHARE_AT_ORIGIN * of as f64 {
             return Err(Error::Unmeasured { what, found, of });
         }
-        check_length("normals", self.len(), self.normals.as_ref().map(Vec::len))?;
-        check_length("sigma", self.len(), self.sigma.as_ref().map(Vec::len))?;
-        check_length("intensity", self.len(), self.intensity.as_ref().map(Vec::len))?;
-        check_length("rim", self.len(), self.rim.as_ref().map(Vec::len))?;
+        let planes = [
+            ("normals", self.normals.as_ref().map(Vec::len)),
+            ("sigma", self.sigma.as_ref().map(Vec::len)),
+            ("intensity", self.intensity.as_ref().map(Vec::len)),
+            ("rim", self.rim.as_ref().map(Vec::len)),
+        ];
+        for (plane, found) in planes {
+            require_length(plane, self.len(), found)?;
+        }
         let Some(sigma) = &self.sigma else { return Ok(()) };
         match sigma.iter().position(|s| !(s.is_nan() || (*s > 0.0 && *s < 1e100))) {
-            Some(index) => Err(Error::NotPositive { what: "sigma", index, value: sigma[index] }),
+            Some(index) => Err(InputError::NotPositive { what: "sigma", index, value: sigma[index] }.into()),
             None => Ok(()),
         }
-    }
-}
-
-fn check_length(what: &'static str, expected: usize, found: Option<usize>) -> Result<()> {
-    match found {
-        Some(found) if found != expected => Err(Error::LengthMismatch { what, expected, found }),
-        _ => Ok(()),
     }
 }

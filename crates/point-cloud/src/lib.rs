@@ -11,8 +11,9 @@ pub use cloud::Cloud;
 pub use eigen::{eigenvalues3, eigenvector3};
 pub use error::Error;
 pub use nalgebra;
-pub use neighbours::{Neighbour, NeighbourTree, check_points, is_usable};
+pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{
     OrganisedNormalOptions, SAME_SURFACE_COSINE, UnorganisedNormalOptions, no_normal, normals_with_tree,
     organised_normals, unorganised_normals,
 };
+pub use rigid_pose;

@@ -8,12 +8,10 @@ use std::num::NonZeroUsize;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::Point3;
+use rigid_pose::{InputError, require_option, require_points};
 
 use crate::coincident::Places;
 use crate::error::{Error, Result};
-
-/// Coordinates beyond this would overflow when squared and summed.
-const LARGEST_COORDINATE: f64 = 1e100;
 
 const TWO: NonZeroUsize = NonZeroUsize::MIN.saturating_add(1);
 
@@ -38,12 +36,12 @@ impl NeighbourTree {
     /// Builds the tree over `points` (metre).
     ///
     /// # Errors
-    /// [`Error::Empty`] without points, [`Error::NonFinite`] naming the first point that is not finite.
+    /// [`InputError::Empty`] without points, [`InputError::NonFinite`] naming the first point that is not finite.
     pub fn new(points: &[Point3<f64>]) -> Result<Self> {
         if points.is_empty() {
-            return Err(Error::Empty { what: "the point set of the search tree" });
+            return Err(InputError::Empty { what: "the point set of the search tree" }.into());
         }
-        check_points("point of the search tree", points)?;
+        require_points("point of the search tree", points)?;
         let places = Places::new(points);
         let coordinates: Vec<[f64; 3]> = places.firsts().map(|k| points[k].coords.into()).collect();
         let tree = ImmutableKdTree::new_from_slice(&coordinates).map_err(|e| Error::Tree(e.to_string()))?;
@@ -63,7 +61,7 @@ impl NeighbourTree {
     /// The nearest point; of several at the same distance the one with the lowest index.
     ///
     /// # Errors
-    /// [`Error::NonFinite`] for a query that is not finite.
+    /// [`InputError::NonFinite`] for a query that is not finite.
     pub fn nearest(&self, query: &Point3<f64>) -> Result<Neighbour> {
         let query = checked(query)?;
         Ok(self.nearest_unchecked(&query))
@@ -72,7 +70,7 @@ impl NeighbourTree {
     /// The nearest point not farther than `radius_m`, if there is one.
     ///
     /// # Errors
-    /// [`Error::NonFinite`] for a query that is not finite.
+    /// [`InputError::NonFinite`] for a query that is not finite.
     pub fn nearest_within(&self, query: &Point3<f64>, radius_m: f64) -> Result<Option<Neighbour>> {
         let nearest = self.nearest(query)?;
         Ok((nearest.distance_m <= radius_m).then_some(nearest))
@@ -81,7 +79,7 @@ impl NeighbourTree {
     /// The `count` nearest points in the order of distance, then index (fewer where the tree holds fewer).
     ///
     /// # Errors
-    /// [`Error::NonFinite`] for a query that is not finite.
+    /// [`InputError::NonFinite`] for a query that is not finite.
     pub fn k_nearest(&self, query: &Point3<f64>, count: usize) -> Result<Vec<Neighbour>> {
         let query = checked(query)?;
         let Some(count) = NonZeroUsize::new(count.min(self.len)) else { return Ok(Vec::new()) };
@@ -101,12 +99,10 @@ impl NeighbourTree {
     /// All points not farther than `radius_m` in the order of distance, then index.
     ///
     /// # Errors
-    /// [`Error::NonFinite`] for a query that is not finite, [`Error::InvalidOption`] for a negative or NaN radius.
+    /// [`InputError::NonFinite`] for a query that is not finite, [`InputError::InvalidOption`] for a negative or NaN radius.
     pub fn within(&self, query: &Point3<f64>, radius_m: f64) -> Result<Vec<Neighbour>> {
         let query = checked(query)?;
-        if !(0.0..LARGEST_COORDINATE).contains(&radius_m) {
-            return Err(Error::InvalidOption { name: "radius_m", value: radius_m, domain: "0 or more and finite" });
-        }
+        require_option("radius_m", radius_m, "0 or more and finite", |r| r >= 0.0 && (r * r).is_finite())?;
         let mut found: Vec<Neighbour> = self
             .tree
             .query(&query)
@@ -162,24 +158,6 @@ fn sort(found: &mut [Neighbour]) {
 }
 
 fn checked(query: &Point3<f64>) -> Result<[f64; 3]> {
-    check_points("query point", std::slice::from_ref(query))?;
+    require_points("query point", std::slice::from_ref(query))?;
     Ok([query.x, query.y, query.z])
-}
-
-/// Refuses coordinates that are not finite (or too large to be squared); `what` names the points.
-///
-/// # Errors
-/// [`Error::NonFinite`] with the index of the first one.
-pub fn check_points(what: &'static str, points: &[Point3<f64>]) -> Result<()> {
-    match points.iter().position(|p| !is_usable(p)) {
-        Some(index) => Err(Error::NonFinite { what, index }),
-        None => Ok(()),
-    }
-}
-
-/// Whether all three coordinates are finite and small enough to be squared.
-#[must_use]
-pub fn is_usable(point: &Point3<f64>) -> bool {
-    // NaN fails the comparison.
-    point.iter().all(|c| c.abs() < LARGEST_COORDINATE)
 }

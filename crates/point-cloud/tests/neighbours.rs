@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 use point_cloud::{Error, NeighbourTree};
 use proptest::prelude::*;
+use rigid_pose::InputError;
 
 /// Coordinates on a coarse lattice: many ties, duplicates and points with a coordinate in common.
 fn lattice_points() -> impl Strategy<Value = Vec<Point3<f64>>> {
@@ -39,11 +40,11 @@ proptest! {
 
 #[test]
 fn what_the_tree_would_answer_wrongly_is_refused() {
-    assert!(matches!(NeighbourTree::new(&[]), Err(Error::Empty { .. })));
+    assert!(matches!(NeighbourTree::new(&[]), Err(Error::Input(InputError::Empty { .. }))));
     let bad = [Point3::origin(), Point3::new(0.0, f64::NAN, 0.0)];
-    assert!(matches!(NeighbourTree::new(&bad), Err(Error::NonFinite { index: 1, .. })));
+    assert!(matches!(NeighbourTree::new(&bad), Err(Error::Input(InputError::NonFinite { index: 1, .. }))));
     let huge = [Point3::new(1e200, 0.0, 0.0)];
-    assert!(matches!(NeighbourTree::new(&huge), Err(Error::NonFinite { index: 0, .. })));
+    assert!(matches!(NeighbourTree::new(&huge), Err(Error::Input(InputError::NonFinite { index: 0, .. }))));
     let tree = NeighbourTree::new(&[Point3::origin()]).unwrap();
     assert_eq!((tree.len(), tree.is_empty()), (1, false));
     let nan = Point3::new(f64::NAN, 0.0, 0.0);

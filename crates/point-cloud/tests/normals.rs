@@ -3,6 +3,7 @@
 use crate::common::{Cuboid, Pinhole, Scene, frame, look_at};
 use nalgebra::{Point3, Vector3};
 use point_cloud::{Error, OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
+use rigid_pose::InputError;
 
 fn corner() -> Scene {
     Scene { room: Cuboid::new([-3.0, -3.0, 0.0], [3.0, 3.0, 3.0]), boxes: vec![] }
@@ -97,7 +98,7 @@ fn windows_widen_where_noise_hides_the_surface_and_nowhere_else() {
         assert_eq!(before, after, "pixel {i} had a normal");
     }
     let odd = OrganisedNormalOptions { widest_half_width_px: Some(1), ..narrow };
-    assert!(matches!(organised_normals(&points, 80, 60, &odd), Err(Error::InvalidOption { .. })));
+    assert!(matches!(organised_normals(&points, 80, 60, &odd), Err(Error::Input(InputError::InvalidOption { .. }))));
 }
 
 #[test]
@@ -144,15 +145,21 @@ fn odd_frames_are_answered() {
     assert!(organised_normals(&nothing, 4, 3, &options).unwrap().iter().all(|n| n.x.is_nan()));
     let infinite = vec![[f64::INFINITY, 1.0, 1.0]; 12];
     assert!(organised_normals(&infinite, 4, 3, &options).unwrap().iter().all(|n| n.x.is_nan()));
-    assert!(matches!(organised_normals(&row, 3, 4, &options), Err(Error::LengthMismatch { .. })));
+    assert!(matches!(organised_normals(&row, 3, 4, &options), Err(Error::Input(InputError::LengthMismatch { .. }))));
     for bad in [
         OrganisedNormalOptions { half_width_px: 0, ..options },
         OrganisedNormalOptions { max_relative_jump: f64::NAN, ..options },
         OrganisedNormalOptions { min_fill: 2.0, ..options },
     ] {
-        assert!(matches!(organised_normals(&row, 9, 1, &bad), Err(Error::InvalidOption { .. })));
+        assert!(matches!(organised_normals(&row, 9, 1, &bad), Err(Error::Input(InputError::InvalidOption { .. }))));
     }
     let few = UnorganisedNormalOptions { neighbours: 2, ..UnorganisedNormalOptions::default() };
-    assert!(matches!(unorganised_normals(&[Point3::origin()], &few), Err(Error::InvalidOption { .. })));
-    assert!(matches!(unorganised_normals(&[], &UnorganisedNormalOptions::default()), Err(Error::Empty { .. })));
+    assert!(matches!(
+        unorganised_normals(&[Point3::origin()], &few),
+        Err(Error::Input(InputError::InvalidOption { .. }))
+    ));
+    assert!(matches!(
+        unorganised_normals(&[], &UnorganisedNormalOptions::default()),
+        Err(Error::Input(InputError::Empty { .. }))
+    ));
 }

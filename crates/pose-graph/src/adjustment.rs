@@ -7,13 +7,12 @@
 //! The part of the field that differs from place to place is not estimated: loops would average what their neighbours
 //! share, and promise too much. It enters the covariances once, as one field of the whole path `[Schmidt1966]`.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Vector6};
 
 use super::graph::{Edge, Graph};
 use super::relation::Relation;
 use projective_registration::{COEFFICIENTS, Field, FieldMatrix};
-use rigid_pose::{Uncertain, inverse_jacobian, product_jacobians};
-use rigid_pose::{pose_difference, step_pose, symmetrised};
+use rigid_pose::{Uncertain, pose_difference, relative_jacobians, step_pose, symmetrised};
 
 const MAX_ITERATIONS: usize = 10;
 /// Steps (metre, radian) below which the adjustment has converged: far below every standard deviation.
@@ -123,7 +122,8 @@ impl Graph {
             let by_field = information * observed.by_field;
             normal.field += observed.by_field.transpose() * by_field;
             normal.field_right -= by_field.transpose() * v;
-            let jacobians = [(edge.a, by_first(&poses[edge.a], &model)), (edge.b, by_second(&poses[edge.a]))];
+            let [by_a, by_b] = relative_jacobians(&poses[edge.a], &model);
+            let jacobians = [(edge.a, by_a), (edge.b, by_b)];
             for (k, jk) in jacobians.iter().filter(|(k, _)| *k != 0) {
                 let row = 6 * (k - 1);
                 let weighted = jk.transpose() * information;
@@ -138,40 +138,5 @@ impl Graph {
             }
         }
         normal
-    }
-}
-
-/// Jacobian of `a⁻¹ b` by the tangent of `world_from_a`.
-fn by_first(world_from_a: &Isometry3<f64>, model: &Isometry3<f64>) -> Matrix6<f64> {
-    let a_from_world = world_from_a.inverse();
-    let world_from_b = world_from_a * model;
-    let (by_inverse, _) = product_jacobians(&a_from_world, &world_from_b);
-    by_inverse * inverse_jacobian(world_from_a)
-}
-
-/// Jacobian of `a⁻¹ b` by the tangent of `world_from_b`.
-fn by_second(world_from_a: &Isometry3<f64>) -> Matrix6<f64> {
-    product_jacobians(&world_from_a.inverse(), &Isometry3::identity()).1
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::Vector3;
-
-    #[test]
-    fn jacobians_of_relative_poses_agree_with_differences() {
-        let pose = |x: f64| Isometry3::new(Vector3::new(x, 0.3 - x, 0.2), Vector3::new(0.4 * x, 0.1, x));
-        let (a, b) = (pose(1.2), pose(-0.7));
-        let model = a.inverse() * b;
-        let step = 1e-6;
-        for k in 0..6 {
-            let e = Vector6::from_fn(|i, _| if i == k { step } else { 0.0 });
-            let first = pose_difference(&model, &(step_pose(&a, &e).inverse() * b)) / step;
-            let second = pose_difference(&model, &(a.inverse() * step_pose(&b, &e))) / step;
-            // One-sided differences of curved rotations at 1e-6.
-            assert!((first - by_first(&a, &model).column(k)).norm() < 1e-5);
-            assert!((second - by_second(&a).column(k)).norm() < 1e-5);
-        }
     }
 }

@@ -7,13 +7,11 @@ use nalgebra::Isometry3;
 
 use super::relation::Relation;
 use projective_registration::{Field, FieldMatrix, SharedError};
-
-/// Squared distance (six components) that one in a thousand of right registrations exceeds.
-const LARGEST_SQUARE: f64 = 22.46;
+use statistics::Distribution;
 
 /// Whether a squared Mahalanobis distance (six components) is that of a right registration, at the 99.9 % level.
 pub fn is_likely(square: f64) -> bool {
-    square < LARGEST_SQUARE
+    Distribution::ChiSquared { dof: 6.0 }.survival(square) > 1e-3
 }
 
 /// An observed relative pose.

@@ -1,20 +1,12 @@
 //! What can be chosen in the registration of frames.
 
-use nalgebra::Matrix6;
-
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::shared_error::SharedError;
-use icp_registration::DegeneracyPolicy;
+use rigid_pose::{require_count, require_option, require_positive};
 
 /// Options of [`align_frames`](crate::align_frames). The defaults carry no scale: lengths come from the frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameAlignmentOptions {
-    /// What happens to motions that the geometry does not determine. Default: they are named.
-    pub degeneracy: DegeneracyPolicy,
-    /// Covariance of the guess, tangent `[dt target axes (m), dtheta source axes (rad)]`. With it, the result is the
-    /// most probable pose for guess and frames together, and motions that the geometry does not determine come from the
-    /// guess alone. `None`, the default: the guess is but a start.
-    pub prior: Option<Matrix6<f64>>,
     /// The systematic error that all frames of the sensor share: its part of the covariance does not fall with the number
     /// of pixels. `None`: estimated from the residuals of the pair, which tell the more of it the farther the camera has
     /// moved. Default `None`.
@@ -39,14 +31,12 @@ pub struct FrameAlignmentOptions {
     /// the pairs tell it; most steps are then taken on a quarter of the nodes, and the last one is taken with the
     /// covariance. `None`: only `step_tolerance_m` counts. Default `None`.
     pub noise_fraction: Option<f64>,
-    /// Pairs whose normals enclose a larger angle are refused, radian. Default 45 degrees.
-    pub max_normal_angle_rad: f64,
-    /// Fewest pairs. Default 20.
-    pub min_correspondences: usize,
 }
 
 impl FrameAlignmentOptions {
-    /// Share of the radius beyond whose standard deviation a motion is undetermined where many registrations are put together: poses that
+    /// Share of the radius beyond whose standard deviation a motion is undetermined.
+    pub const OPEN: f64 = 1.0 / 300.0;
+    /// The same where many registrations are put together: poses that
     /// are centimetres weak for a moment have little weight there, and are worth more than none.
     pub const OPEN_IN_A_GRAPH: f64 = 1.0 / 50.0;
 }
@@ -54,8 +44,6 @@ impl FrameAlignmentOptions {
 impl Default for FrameAlignmentOptions {
     fn default() -> Self {
         Self {
-            degeneracy: DegeneracyPolicy::Report,
-            prior: None,
             shared_error: None,
             max_motion_sigma_m: None,
             levels: 4,
@@ -63,53 +51,16 @@ impl Default for FrameAlignmentOptions {
             max_iterations: 60,
             step_tolerance_m: None,
             noise_fraction: None,
-            max_normal_angle_rad: std::f64::consts::FRAC_PI_4,
-            min_correspondences: 20,
         }
     }
 }
 
 impl FrameAlignmentOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        let positive = [
-            ("max_motion_sigma_m", self.max_motion_sigma_m),
-            ("step_tolerance_m", self.step_tolerance_m),
-            ("noise_fraction", self.noise_fraction),
-        ];
-        for (name, value) in positive {
-            if let Some(value) = value
-                && !(value > 0.0 && value.is_finite())
-            {
-                return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
-            }
-        }
-        let angle = self.max_normal_angle_rad;
-        if !(angle > 0.0 && angle <= std::f64::consts::PI) {
-            return Err(Error::InvalidOption {
-                name: "max_normal_angle_rad",
-                value: angle,
-                domain: "above 0, at most pi",
-            });
-        }
-        let counts = [
-            ("levels", self.levels, 1, 4, "1 to 4"),
-            ("max_iterations", self.max_iterations, 1, usize::MAX, "1 or more"),
-            ("min_correspondences", self.min_correspondences, 6, usize::MAX, "6 or more"),
-        ];
-        for (name, value, least, most, domain) in counts {
-            if value < least || value > most {
-                return Err(Error::InvalidOption { name, value: value as f64, domain });
-            }
-        }
-        match &self.prior {
-            Some(prior) if prior.iter().any(|v| !v.is_finite()) => {
-                Err(Error::NonFinite { what: "the prior", index: 0 })
-            }
-            Some(prior) if prior.cholesky().is_none() => {
-                let value = prior.diagonal().min();
-                Err(Error::InvalidOption { name: "prior", value, domain: "positive definite" })
-            }
-            _ => Ok(()),
-        }
+        require_positive("max_motion_sigma_m", self.max_motion_sigma_m)?;
+        require_positive("step_tolerance_m", self.step_tolerance_m)?;
+        require_positive("noise_fraction", self.noise_fraction)?;
+        require_option("levels", self.levels as f64, "1 to 4", |levels| (1.0..=4.0).contains(&levels))?;
+        Ok(require_count("max_iterations", self.max_iterations, 1)?)
     }
 }

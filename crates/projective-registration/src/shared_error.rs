@@ -7,7 +7,7 @@
 //! expectation 0 and, by degree, variances that are estimated from the residuals of registrations beside their random
 //! part (quadratic and unbiased `[Rao1971]`): residuals of neighbours differ by the random part alone.
 
-use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use statistics::SIGMA_OF_MAD;
 
 use crate::partners::map::Agreement;
@@ -213,8 +213,7 @@ impl OrganisedFrame {
         sightings: &mut Vec<Sighting>,
         scratch: &mut Vec<u32>,
     ) -> Option<Influence> {
-        let centre = (self_from_source * Point3::from(source.points.centre)).coords;
-        let frame = Centred { centre, radius_m: source.points.radius_m.max(f64::MIN_POSITIVE) };
+        let frame = source.centred(self_from_source);
         sightings.clear();
         let mut follows = false;
         let each = |partner: Option<Partner>| {
@@ -246,7 +245,7 @@ impl OrganisedFrame {
         let by_scale = normal.dot(&(point - source_place));
         let of_source = source.field(partner.source as usize) * by_scale;
         let of_target = self.field(partner.node as usize) * plane[3];
-        let variance = f64::from(partner.variance());
+        let variance = f64::from(partner.variance);
         // Planes that have learnt from other frames lie between the errors of these.
         let learnt = self.measured.get(partner.node as usize).map_or(0.0, |measured| plane[3] - f64::from(*measured));
         Sighting {

@@ -89,7 +89,7 @@ impl MotionEquations {
     /// `damping`: share of the mean information that is added to every motion, so that what hardly matters does not run away.
     ///
     /// # Errors
-    /// [`Error::Numerical`](crate::Error::Numerical) where the equations are not finite.
+    /// [`InputError::Numerical`](crate::InputError::Numerical) where the equations are not finite.
     pub fn step(&self, free: &Matrix6<f64>, damping: f64) -> Result<Vector6<f64>> {
         let matrix = symmetrised(&(free * self.matrix * free));
         let gradient = free * self.gradient;

@@ -1,9 +1,26 @@
 //! What can go wrong, with the value that was wrong.
 
-/// Every error of this crate.
+/// What is wrong with an input or an option, or what there is too little of: the error of this crate, and of inputs of the
+/// crates that register with poses.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
+pub enum InputError {
+    /// There is nothing to work on.
+    #[error("{what} is empty")]
+    Empty {
+        /// Which input.
+        what: &'static str,
+    },
+    /// An option has a value outside its domain.
+    #[error("option {name} is {value}; it must be {domain}")]
+    InvalidOption {
+        /// The option's field name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The values that are allowed.
+        domain: &'static str,
+    },
     /// A coordinate, weight or sigma is NaN, infinite or beyond ±1e100.
     #[error("{what}: entry {index} is not a finite number below 1e100")]
     NonFinite {
@@ -42,6 +59,23 @@ pub enum Error {
         /// Points needed.
         needed: usize,
     },
+    /// Too few source points have a partner in the target.
+    #[error(
+        "{found} of {of} source points have a partner within {max_distance_m} m in iteration {iteration}, \
+         at least {needed} are needed: no overlap, or the guess is too far off"
+    )]
+    TooFewCorrespondences {
+        /// Pairs found.
+        found: usize,
+        /// Source points tried.
+        of: usize,
+        /// Pairs needed.
+        needed: usize,
+        /// Limit of the distance at that moment, metre.
+        max_distance_m: f64,
+        /// Iteration, counted from 0.
+        iteration: usize,
+    },
     /// The points lie on one line (or in one place): the rotation about it is not determined.
     #[error("{what}: the points are collinear (second to first extent {ratio:.1e})")]
     Collinear {
@@ -66,13 +100,19 @@ pub enum Error {
     },
 }
 
-impl Error {
+impl InputError {
     /// Whether the input or an option is wrong; otherwise the data do not show what was asked for.
     #[must_use]
     pub fn is_misuse(&self) -> bool {
-        matches!(self, Self::NonFinite { .. } | Self::NotPositive { .. } | Self::LengthMismatch { .. })
+        matches!(
+            self,
+            Self::NonFinite { .. }
+                | Self::NotPositive { .. }
+                | Self::LengthMismatch { .. }
+                | Self::InvalidOption { .. }
+        )
     }
 }
 
 /// Result of this crate.
-pub(crate) type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, InputError>;

@@ -4,6 +4,7 @@ mod absolute_orientation;
 mod centred;
 mod error;
 mod motions;
+mod requirements;
 mod tangent;
 mod uncertain;
 
@@ -12,8 +13,11 @@ pub use absolute_orientation::{
     absolute_orientation_with_scale,
 };
 pub use centred::{Centred, MotionEquations, free_of, symmetric};
-pub use error::Error;
+pub use error::InputError;
 pub use motions::eigen6;
 pub use nalgebra;
-pub use tangent::{inverse_covariance_transport, is_finite, pose_difference, step_pose, symmetrised};
-pub use uncertain::{Uncertain, inverse_jacobian, product_jacobians};
+pub use requirements::{
+    is_finite, is_usable, require_count, require_length, require_option, require_points, require_pose, require_positive,
+};
+pub use tangent::{inverse_covariance_transport, pose_difference, step_pose, symmetrised};
+pub use uncertain::{Uncertain, inverse_jacobian, product_jacobians, relative_jacobians};

@@ -42,9 +42,3 @@ pub fn inverse_covariance_transport(a_from_b: &Isometry3<f64>, covariance: &Matr
 pub fn symmetrised(m: &Matrix6<f64>) -> Matrix6<f64> {
     (m + m.transpose()) * 0.5
 }
-
-/// Whether all numbers of a pose are finite.
-#[must_use]
-pub fn is_finite(pose: &Isometry3<f64>) -> bool {
-    pose.translation.vector.iter().all(|v| v.abs() < 1e100) && pose.rotation.coords.iter().all(|v| v.is_finite())
-}

@@ -78,6 +78,14 @@ pub fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<f64>) -
     (by_first, by_second)
 }
 
+/// Jacobians of the tangent of `a_from_b`, the one of two poses in the frame of the other, by those of `world_from_a` and
+/// `world_from_b`.
+#[must_use]
+pub fn relative_jacobians(world_from_a: &Isometry3<f64>, a_from_b: &Isometry3<f64>) -> [Matrix6<f64>; 2] {
+    let (by_inverse, by_second) = product_jacobians(&world_from_a.inverse(), &(world_from_a * a_from_b));
+    [by_inverse * inverse_jacobian(world_from_a), by_second]
+}
+
 /// Jacobian of the tangent of the inverse.
 #[must_use]
 pub fn inverse_jacobian(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
@@ -105,6 +113,7 @@ mod tests {
     fn jacobians_of_products_agree_with_differences() {
         let (a, b) = (pose(1.1), pose(-0.6));
         let (by_first, by_second) = product_jacobians(&a, &b);
+        let by = relative_jacobians(&a, &(a.inverse() * b));
         let step = 1e-6;
         for k in 0..6 {
             let e = Vector6::from_fn(|i, _| if i == k { step } else { 0.0 });
@@ -113,6 +122,10 @@ mod tests {
             // One-sided differences of curved rotations at 1e-6.
             assert!((first - by_first.column(k)).norm() < 1e-5);
             assert!((second - by_second.column(k)).norm() < 1e-5);
+            let relative = a.inverse() * b;
+            let first = pose_difference(&relative, &(step_pose(&a, &e).inverse() * b)) / step;
+            let second = pose_difference(&relative, &(a.inverse() * step_pose(&b, &e))) / step;
+            assert!((first - by[0].column(k)).norm() < 1e-5 && (second - by[1].column(k)).norm() < 1e-5);
         }
     }
 

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use rigid_pose::{Error, absolute_orientation, absolute_orientation_with_scale, pose_difference};
+use rigid_pose::{InputError, absolute_orientation, absolute_orientation_with_scale, pose_difference};
 
 fn random_points(n: usize, spread: f64, random: &mut Pcg64) -> Vec<Point3<f64>> {
     (0..n).map(|_| Point3::from(Vector3::from_fn(|_, _| spread * normal(random)))).collect()
@@ -107,20 +107,29 @@ fn weight_zero_leaves_a_pair_out() {
 #[test]
 fn what_cannot_be_solved_is_refused() {
     let line: Vec<_> = (0..10).map(|i| Point3::new(f64::from(i) * 0.1 + 1e3, 2.0 * f64::from(i), 5.0)).collect();
-    assert!(matches!(absolute_orientation(&line, &line, None), Err(Error::Collinear { what: "source points", .. })));
+    assert!(matches!(
+        absolute_orientation(&line, &line, None),
+        Err(InputError::Collinear { what: "source points", .. })
+    ));
     let same = vec![Point3::new(1.0, 2.0, 3.0); 5];
-    assert!(matches!(absolute_orientation(&same, &same, None), Err(Error::Collinear { .. })));
-    assert!(matches!(absolute_orientation(&line[..2], &line[..2], None), Err(Error::TooFewPoints { found: 2, .. })));
-    assert!(matches!(absolute_orientation(&[], &[], None), Err(Error::TooFewPoints { found: 0, .. })));
-    assert!(matches!(absolute_orientation(&line[..3], &line[..4], None), Err(Error::LengthMismatch { .. })));
+    assert!(matches!(absolute_orientation(&same, &same, None), Err(InputError::Collinear { .. })));
+    assert!(matches!(
+        absolute_orientation(&line[..2], &line[..2], None),
+        Err(InputError::TooFewPoints { found: 2, .. })
+    ));
+    assert!(matches!(absolute_orientation(&[], &[], None), Err(InputError::TooFewPoints { found: 0, .. })));
+    assert!(matches!(absolute_orientation(&line[..3], &line[..4], None), Err(InputError::LengthMismatch { .. })));
     let mut broken = line.clone();
     broken[3].y = f64::NAN;
-    assert!(matches!(absolute_orientation(&broken, &line, None), Err(Error::NonFinite { index: 3, .. })));
+    assert!(matches!(absolute_orientation(&broken, &line, None), Err(InputError::NonFinite { index: 3, .. })));
     let weights = vec![1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
-    assert!(matches!(absolute_orientation(&line, &line, Some(&weights)), Err(Error::NotPositive { index: 1, .. })));
+    assert!(matches!(
+        absolute_orientation(&line, &line, Some(&weights)),
+        Err(InputError::NotPositive { index: 1, .. })
+    ));
     // A cross in space against its mirror image: turns about several axes fit equally well.
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     let cross: Vec<Point3<f64>> = axes.into_iter().flat_map(|v| [v, -v]).map(Point3::from).collect();
     let mirrored: Vec<_> = cross.iter().map(|p| Point3::from(-p.coords)).collect();
-    assert!(matches!(absolute_orientation(&cross, &mirrored, None), Err(Error::AmbiguousRotation { .. })));
+    assert!(matches!(absolute_orientation(&cross, &mirrored, None), Err(InputError::AmbiguousRotation { .. })));
 }

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use rigid_pose::{Error, RotationMethod, absolute_orientation_by, pose_difference};
+use rigid_pose::{InputError, RotationMethod, absolute_orientation_by, pose_difference};
 
 const METHODS: [RotationMethod; 4] = [
     RotationMethod::UnitQuaternion,
@@ -106,10 +106,10 @@ fn what_has_no_answer_is_refused_by_all() {
     let cross: Vec<Point3<f64>> = axes.into_iter().flat_map(|v| [v, -v]).map(Point3::from).collect();
     let mirrored: Vec<_> = cross.iter().map(|p| Point3::from(-p.coords)).collect();
     for method in METHODS {
-        assert!(matches!(absolute_orientation_by(method, &line, &line, None), Err(Error::Collinear { .. })));
+        assert!(matches!(absolute_orientation_by(method, &line, &line, None), Err(InputError::Collinear { .. })));
         let ambiguous = absolute_orientation_by(method, &cross, &mirrored, None);
-        assert!(matches!(ambiguous, Err(Error::AmbiguousRotation { .. })), "{method:?}: {ambiguous:?}");
+        assert!(matches!(ambiguous, Err(InputError::AmbiguousRotation { .. })), "{method:?}: {ambiguous:?}");
         let few = absolute_orientation_by(method, &line[..2], &line[..2], None);
-        assert!(matches!(few, Err(Error::TooFewPoints { .. })));
+        assert!(matches!(few, Err(InputError::TooFewPoints { .. })));
     }
 }

@@ -5,7 +5,7 @@
 
 use inertial::{ImuNoise, InertialSample, InertialState};
 use nalgebra::{Isometry3, Vector3};
-use rigid_pose::Uncertain;
+use rigid_pose::{Uncertain, require_pose};
 
 use crate::MotionPrior;
 use crate::error::{Error, Result};
@@ -28,11 +28,9 @@ impl ImuIntegrator {
     /// last sample is the first moment that motions begin at.
     ///
     /// # Errors
-    /// [`Error::Inertial`] where the unit did not rest or its samples or noise cannot be used, [`Error::NonFinite`] for the mounting.
+    /// [`Error::Inertial`] where the unit did not rest or its samples or noise cannot be used, [`Error::Input`] for the mounting.
     pub fn from_rest(samples: &[InertialSample], camera_from_body: &Isometry3<f64>, noise: &ImuNoise) -> Result<Self> {
-        if !rigid_pose::is_finite(camera_from_body) {
-            return Err(Error::NonFinite { what: "camera_from_body", index: 0 });
-        }
+        require_pose("camera_from_body", camera_from_body)?;
         let last_s = samples.last().map_or(0.0, |sample| sample.timestamp_s);
         let state = InertialState::at_rest(samples, last_s, &Uncertain::exact(Isometry3::identity()), noise)?;
         let samples = samples.last().copied().into_iter().collect();

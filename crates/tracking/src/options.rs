@@ -1,9 +1,9 @@
 //! What can be chosen in tracking.
 
 use nalgebra::Isometry3;
+use rigid_pose::{require_count, require_option, require_pose};
 
-use crate::error::{Error, Result};
-use global_registration::CoarseOptions;
+use crate::error::Result;
 use projective_registration::FrameAlignmentOptions;
 
 /// Whether keyframes learn from the frames tracked against them.
@@ -18,7 +18,7 @@ pub enum Fusion {
 }
 
 /// How the pose is sought after a loss.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Relocalisation {
     /// Only around the prediction, and from the poses of the keyframes that look most like the frame.
@@ -26,8 +26,6 @@ pub enum Relocalisation {
     /// Then also by alignment without a guess, with one keyframe a frame.
     #[default]
     Coarse,
-    /// The same with other options.
-    CoarseWith(Box<CoarseOptions>),
     /// As [`Coarse`](Self::Coarse), for streams that do not wait: a lost frame is registered with two keyframes, other ones each time,
     /// and the alignment without a guess goes on beside the frames, on a thread of its own. What it finds serves the tenth frame
     /// behind the one that was aligned, which waits for it, so that the same frames give the same bits.
@@ -42,8 +40,7 @@ const NOISE_FRACTION: f64 = 4.0;
 /// Options of a [`Tracker`](crate::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
-    /// Registration of a frame with a keyframe. Undetermined motions are always reported, so that the prediction can
-    /// carry them, and turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
+    /// Registration of a frame with a keyframe. Turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
     /// the first frame. Default: that of [`FrameAlignmentOptions`] with the share of noise of a stream.
     pub alignment: FrameAlignmentOptions,
     /// Pose of the first frame: the datum, without error. Default: the identity.
@@ -81,17 +78,9 @@ impl Default for TrackerOptions {
 
 impl TrackerOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        if !rigid_pose::is_finite(&self.world_from_first) {
-            return Err(Error::NonFinite { what: "world_from_first", index: 0 });
-        }
-        if !(self.keyframe_overlap > 0.0 && self.keyframe_overlap < 1.0) {
-            let value = self.keyframe_overlap;
-            return Err(Error::InvalidOption { name: "keyframe_overlap", value, domain: "above 0 and below 1" });
-        }
-        if self.max_keyframes < 2 {
-            let value = self.max_keyframes as f64;
-            return Err(Error::InvalidOption { name: "max_keyframes", value, domain: "2 or more" });
-        }
-        Ok(())
+        require_pose("world_from_first", &self.world_from_first)?;
+        let is_share = |overlap| overlap > 0.0 && overlap < 1.0;
+        require_option("keyframe_overlap", self.keyframe_overlap, "above 0 and below 1", is_share)?;
+        Ok(require_count("max_keyframes", self.max_keyframes, 2)?)
     }
 }

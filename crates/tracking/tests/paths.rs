@@ -8,6 +8,7 @@ use projective_registration::Error as FrameError;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use rigid_pose::InputError;
 use rigid_pose::step_pose;
 use tracking::Error;
 use tracking::{LossReason, MotionPrior, Relocalisation, TrackedPose, Tracker, TrackerOptions, TrackingState};
@@ -254,16 +255,16 @@ fn what_is_no_frame_is_refused_and_changes_nothing() {
     assert!(matches!(tracker.track(f64::NAN, &points, None, None), Err(Error::NotAscending { .. })));
     assert!(matches!(
         tracker.track(1.0, &points[1..], None, None),
-        Err(Error::Frames(FrameError::LengthMismatch { .. }))
+        Err(Error::Frames(FrameError::Input(InputError::LengthMismatch { .. })))
     ));
     assert!(matches!(
         tracker.track(1.0, &points, Some(&sigma[1..]), None),
-        Err(Error::Frames(FrameError::LengthMismatch { .. }))
+        Err(Error::Frames(FrameError::Input(InputError::LengthMismatch { .. })))
     ));
     let bad = MotionPrior { current_from_previous: Isometry3::identity(), covariance: Matrix6::zeros() };
-    assert!(matches!(tracker.track(1.0, &points, None, Some(&bad)), Err(Error::Numerical { .. })));
+    assert!(matches!(tracker.track(1.0, &points, None, Some(&bad)), Err(Error::Input(InputError::Numerical { .. }))));
     assert_eq!(tracker.trajectory(), before);
     assert_eq!(tracker.track(1.0, &points, Some(&sigma), None).unwrap().state, TrackingState::Tracked);
     let options = TrackerOptions { max_keyframes: 1, ..TrackerOptions::default() };
-    assert!(matches!(Tracker::new(&projection(&camera), options), Err(Error::InvalidOption { .. })));
+    assert!(matches!(Tracker::new(&projection(&camera), options), Err(Error::Input(InputError::InvalidOption { .. }))));
 }

@@ -2,6 +2,7 @@
 
 use approx::assert_relative_eq;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rigid_pose::InputError;
 use tracking::Error;
 use tracking::{
     ErrorStatistics, RelativeStep, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error,
@@ -154,7 +155,7 @@ fn drift_is_stated_for_the_step() {
     }
     assert!(matches!(
         absolute_trajectory_error(&estimate, &truth, &options),
-        Err(Error::Pose(rigid_pose::Error::Collinear { .. }))
+        Err(Error::Input(InputError::Collinear { .. }))
     ));
 }
 
@@ -182,11 +183,14 @@ fn bad_input_is_refused_by_name() {
     assert!(fault(&broken, &truth).contains("entry 5"));
     assert!(matches!(
         absolute_trajectory_error(&estimate[..2], &truth, &options),
-        Err(Error::Pose(rigid_pose::Error::TooFewPoints { .. }))
+        Err(Error::Input(InputError::TooFewPoints { .. }))
     ));
     for step in [RelativeStep::Frames(0), RelativeStep::Seconds(f64::NAN), RelativeStep::Metres(-1.0)] {
-        assert!(matches!(relative_pose_error(&estimate, &truth, step, &options), Err(Error::InvalidOption { .. })));
+        assert!(matches!(
+            relative_pose_error(&estimate, &truth, step, &options),
+            Err(Error::Input(InputError::InvalidOption { .. }))
+        ));
     }
     let long = relative_pose_error(&estimate, &truth, RelativeStep::Metres(1e6), &options);
-    assert!(matches!(long, Err(Error::TooFewPoints { .. })));
+    assert!(matches!(long, Err(Error::Input(InputError::TooFewPoints { .. }))));
 }

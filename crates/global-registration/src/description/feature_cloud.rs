@@ -1,6 +1,7 @@
 //! A cloud prepared for alignment without a guess.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use rigid_pose::InputError;
 
 use crate::description::descriptors::DescriptorTable;
 use crate::description::features::Features;
@@ -13,7 +14,7 @@ use crate::options::{CoarseOptions, SurfaceDescriptors, Viewpoint};
 use crate::description::surface::Normals;
 use crate::description::surroundings::Surroundings;
 use crate::description::view::View;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use point_cloud::Cloud;
 
 /// Fewest averaged points.
@@ -56,8 +57,8 @@ impl FeatureCloud {
     /// Normals of the cloud are used for their side only where there is no viewpoint; points at its rim are left out.
     ///
     /// # Errors
-    /// [`Error::Empty`], [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::NotPositive`] for the cloud,
-    /// [`Error::InvalidOption`], [`Error::TooFewPoints`] where fewer than 10 voxels are occupied.
+    /// [`InputError::Empty`], [`InputError::NonFinite`], [`InputError::LengthMismatch`], [`InputError::NotPositive`] for the cloud,
+    /// [`InputError::InvalidOption`], [`InputError::TooFewPoints`] where fewer than 10 voxels are occupied.
     pub fn new(cloud: &Cloud, options: &CoarseOptions) -> Result<Self> {
         options.validate()?;
         cloud.validate("the cloud")?;
@@ -66,7 +67,12 @@ impl FeatureCloud {
 
     fn of_reduced(mut reduced: Reduced, options: &CoarseOptions, viewpoint: Viewpoint) -> Result<Self> {
         if reduced.len() < LEAST_POINTS {
-            return Err(Error::TooFewPoints { what: "occupied voxels", found: reduced.len(), needed: LEAST_POINTS });
+            return Err(InputError::TooFewPoints {
+                what: "occupied voxels",
+                found: reduced.len(),
+                needed: LEAST_POINTS,
+            }
+            .into());
         }
         let voxel = reduced.voxel_m as f32;
         let radius = options.descriptor_radius_voxels as f32 * voxel;

@@ -3,8 +3,8 @@
 use nalgebra::Point3;
 
 use crate::description::descriptors::DescriptorTable;
-use crate::error::{Error, Result};
-use point_cloud::check_points;
+use crate::error::Result;
+use rigid_pose::{InputError, require_count, require_length, require_points};
 
 /// Points in a cloud's frame with a descriptor each.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,19 +18,14 @@ impl Features {
     /// other, compared by the angle between them.
     ///
     /// # Errors
-    /// [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::InvalidOption`] for a width of 0.
+    /// [`InputError::NonFinite`], [`InputError::LengthMismatch`], [`InputError::InvalidOption`] for a width of 0.
     pub fn new(points: Vec<Point3<f64>>, descriptors: &[f32], width: usize) -> Result<Self> {
-        if width == 0 {
-            return Err(Error::InvalidOption { name: "width", value: 0.0, domain: "1 or more" });
-        }
-        check_points("feature", &points)?;
-        let expected = points.len().saturating_mul(width);
-        if descriptors.len() != expected {
-            return Err(Error::LengthMismatch { what: "descriptors", expected, found: descriptors.len() });
-        }
+        require_count("width", width, 1)?;
+        require_points("feature", &points)?;
+        require_length("descriptors", points.len().saturating_mul(width), descriptors.len())?;
         // Beyond this the square of a value overflows.
         if let Some(index) = descriptors.iter().position(|v| v.is_nan() || v.abs() >= 1e15) {
-            return Err(Error::NonFinite { what: "descriptors", index });
+            return Err(InputError::NonFinite { what: "descriptors", index }.into());
         }
         Ok(Self { points, table: DescriptorTable::of_vectors(descriptors.to_vec(), width) })
     }

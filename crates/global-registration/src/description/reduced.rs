@@ -1,9 +1,10 @@
 //! A cloud averaged in voxels, in single precision about its middle, sorted by coarse cells.
 
 use nalgebra::{Point3, Vector3};
+use rigid_pose::InputError;
 
 use crate::cells::{CellTable, key_of};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use point_cloud::Cloud;
 
 /// Points that the middle and the size of a cloud are taken from.
@@ -38,7 +39,7 @@ impl Reduced {
         let (middle, radius) = middle_and_radius(&cloud.points);
         let mut voxel = voxel_m.unwrap_or_else(|| on_ladder(radius / VOXELS_IN_RADIUS));
         if !(voxel > 0.0 && voxel.is_finite()) {
-            return Err(Error::TooFewPoints { what: "cloud of features", found: 1, needed: 10 });
+            return Err(InputError::TooFewPoints { what: "cloud of features", found: 1, needed: 10 }.into());
         }
         loop {
             let (reduced, count) = Self::with_voxel(cloud, middle, voxel);

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3};
 
 use crate::description::features::Features;
-use crate::error::{Error, Result};
-use rigid_pose::absolute_orientation;
+use crate::error::Result;
+use rigid_pose::{InputError, absolute_orientation, require_length, require_option, require_points};
 
 /// Options of [`align_features`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,20 +26,16 @@ impl SparseIcpOptions {
     }
 
     fn validate(&self) -> Result<()> {
-        let ordered = self.initial_distance_m >= self.final_distance_m && self.initial_distance_m.is_finite();
-        if !ordered {
-            let (name, value) = ("initial_distance_m", self.initial_distance_m);
-            return Err(Error::InvalidOption { name, value, domain: "finite and at least the final distance" });
-        }
-        if self.final_distance_m <= 0.0 {
-            let (name, value) = ("final_distance_m", self.final_distance_m);
-            return Err(Error::InvalidOption { name, value, domain: "positive" });
-        }
-        if !(-1.0..=1.0).contains(&self.min_likeness) {
-            let (name, value) = ("min_likeness", self.min_likeness);
-            return Err(Error::InvalidOption { name, value, domain: "between -1 and 1" });
-        }
-        Ok(())
+        let is_start = |distance: f64| distance >= self.final_distance_m && distance.is_finite();
+        require_option(
+            "initial_distance_m",
+            self.initial_distance_m,
+            "finite and at least the final distance",
+            is_start,
+        )?;
+        require_option("final_distance_m", self.final_distance_m, "positive", |distance| distance > 0.0)?;
+        let is_likeness = |likeness| (-1.0..=1.0).contains(&likeness);
+        Ok(require_option("min_likeness", self.min_likeness, "between -1 and 1", is_likeness)?)
     }
 }
 
@@ -60,8 +56,8 @@ pub struct SparseAlignment {
 /// reach, the one whose descriptor resembles it most. The reach is halved whenever the pairs no longer change.
 ///
 /// # Errors
-/// [`Error::InvalidOption`], [`Error::LengthMismatch`] for descriptors of different width, [`Error::NonFinite`] for the
-/// guess, [`Error::TooFewCorrespondences`] below 4 pairs, and those of [`absolute_orientation`].
+/// [`InputError::InvalidOption`], [`InputError::LengthMismatch`] for descriptors of different width, [`InputError::NonFinite`] for the
+/// guess, [`InputError::TooFewCorrespondences`] below 4 pairs, and those of [`absolute_orientation`].
 pub fn align_features(
     source: &Features,
     target: &Features,
@@ -69,23 +65,21 @@ pub fn align_features(
     options: &SparseIcpOptions,
 ) -> Result<SparseAlignment> {
     options.validate()?;
-    let (expected, found) = (target.table.width(), source.table.width());
-    if expected != found {
-        return Err(Error::LengthMismatch { what: "descriptors of the source", expected, found });
-    }
-    point_cloud::check_points("guess", &[guess * Point3::origin()])?;
+    require_length("descriptors of the source", target.table.width(), source.table.width())?;
+    require_points("guess", &[guess * Point3::origin()])?;
     let mut found = SparseAlignment { target_from_source: *guess, pairs: Vec::new(), rms_m: f64::NAN, iterations: 0 };
     let mut reach = options.initial_distance_m;
     while found.iterations < options.max_iterations.max(1) {
         let pairs = partners(source, target, &found.target_from_source, reach, options.min_likeness as f32);
         if pairs.len() < 4 {
-            return Err(Error::TooFewCorrespondences {
+            return Err(InputError::TooFewCorrespondences {
                 found: pairs.len(),
                 of: source.len(),
                 needed: 4,
                 max_distance_m: reach,
                 iteration: found.iterations,
-            });
+            }
+            .into());
         }
         let from: Vec<Point3<f64>> = pairs.iter().map(|pair| source.points[pair[0]]).collect();
         let to: Vec<Point3<f64>> = pairs.iter().map(|pair| target.points[pair[1]]).collect();

@@ -24,8 +24,8 @@ use point_cloud::Cloud;
 /// the metric needs them. For several sources against one target, build an [`IcpTarget`] once.
 ///
 /// # Errors
-/// [`crate::Error::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`crate::Error::Cloud`],
-/// [`crate::Error::NonFinite`], [`crate::Error::InvalidOption`] for the input.
+/// [`InputError::TooFewCorrespondences`](rigid_pose::InputError::TooFewCorrespondences) where the clouds do not overlap at the guess; [`crate::Error::Cloud`],
+/// [`InputError::NonFinite`](rigid_pose::InputError::NonFinite), [`InputError::InvalidOption`](rigid_pose::InputError::InvalidOption) for the input.
 pub fn align(source: &Cloud, target: &Cloud, guess: &Isometry3<f64>, options: &IcpOptions) -> Result<IcpResult> {
     // What is known of single points is not thrown away.
     let is_bare = [source, target].iter().all(|cloud| cloud.normals.is_none() && cloud.sigma.is_none());

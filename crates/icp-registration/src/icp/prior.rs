@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use crate::error::{Error, Result};
-use rigid_pose::{pose_difference, step_pose, symmetrised};
+use rigid_pose::{InputError, pose_difference, step_pose, symmetrised};
 
 /// The pose of least squares between what the pairs say (`information`, zero along what they leave open) and the guess
 /// with its covariance, and its covariance; both in the tangent `[dt target axes, dtheta source axes]`.
@@ -18,7 +18,8 @@ pub(super) fn fused_with_prior(
     let turn = (pose.rotation.inverse() * guess.rotation).to_rotation_matrix().into_inner();
     let mut carried = Matrix6::identity();
     carried.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
-    let failed = Error::Numerical { what: "the fusion with the prior", why: "a covariance is not positive definite" };
+    let failed =
+        InputError::Numerical { what: "the fusion with the prior", why: "a covariance is not positive definite" };
     let weight = scaled_inverse(&(carried * prior * carried.transpose())).ok_or(failed.clone())?;
     let towards_guess = pose_difference(pose, guess);
     let covariance = scaled_inverse(&(information + weight)).ok_or(failed)?;
@@ -41,9 +42,10 @@ pub(super) fn validate(prior: Option<&Matrix6<f64>>) -> Result<()> {
     };
     let diagonal: Vector6<f64> = prior.diagonal();
     match (0..6).find(|&k| !(diagonal[k] > 0.0 && diagonal[k].is_finite())) {
-        Some(index) => Err(Error::NotPositive { what: "prior_covariance", index, value: diagonal[index] }),
+        Some(index) => Err(InputError::NotPositive { what: "prior_covariance", index, value: diagonal[index] }.into()),
         None if scaled_inverse(prior).is_none() => {
-            Err(Error::Numerical { what: "the covariance of the prior", why: "it is not positive definite" })
+            Err(InputError::Numerical { what: "the covariance of the prior", why: "it is not positive definite" }
+                .into())
         }
         None => Ok(()),
     }

@@ -1,8 +1,9 @@
 //! More starts around the guess, for when the first does not convince.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rigid_pose::{require_count, require_option};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// The positive root of x⁷ = x + 1: its powers spread points evenly over six dimensions.
 const ROOT_OF_SIX: f64 = 1.112_775_684_278_705_5;
@@ -56,15 +57,11 @@ impl Starts {
     }
 
     pub(super) fn validate(&self) -> Result<()> {
-        let shares = [("translation", self.translation), ("rotation_rad", self.rotation_rad)];
-        for (name, value) in shares.into_iter().chain([("convincing", self.convincing)]) {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::InvalidOption { name, value, domain: "0 or more and finite" });
-            }
+        let shares =
+            [("translation", self.translation), ("rotation_rad", self.rotation_rad), ("convincing", self.convincing)];
+        for (name, value) in shares {
+            require_option(name, value, "0 or more and finite", |value| value >= 0.0 && value.is_finite())?;
         }
-        if self.points == 0 {
-            return Err(Error::InvalidOption { name: "points", value: 0.0, domain: "1 or more" });
-        }
-        Ok(())
+        Ok(require_count("points", self.points, 1)?)
     }
 }

@@ -1,7 +1,9 @@
 //! Refuses parts whose parameters are outside their domain.
 
+use rigid_pose::{require_count, require_positive};
+
 use super::{Levels, Registration, prior};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::parts::Scene;
 use crate::result::DegeneracyPolicy;
 
@@ -31,34 +33,17 @@ impl Registration<'_> {
         if self.degeneracy == DegeneracyPolicy::HoldAtPrior {
             prior::validate(self.prior_covariance.as_ref())?;
         }
-        positive("max_motion_sigma_m", self.max_motion_sigma_m)?;
-        if self.min_correspondences < 3 {
-            let value = self.min_correspondences as f64;
-            return Err(Error::InvalidOption { name: "min_correspondences", value, domain: "3 or more" });
-        }
-        Ok(())
+        require_positive("max_motion_sigma_m", self.max_motion_sigma_m)?;
+        Ok(require_count("min_correspondences", self.min_correspondences, 3)?)
     }
 }
 
 impl Levels {
     fn validate(&self) -> Result<()> {
-        positive("max_correspondence_distance_m", self.last_limit_m)?;
-        positive("initial_correspondence_distance_m", self.first_limit_m)?;
-        positive("step_fraction", Some(self.step_fraction))?;
-        for (name, value) in [("points", self.points), ("iterations", self.iterations)] {
-            if value == 0 {
-                return Err(Error::InvalidOption { name, value: 0.0, domain: "1 or more" });
-            }
-        }
-        Ok(())
-    }
-}
-
-fn positive(name: &'static str, value: Option<f64>) -> Result<()> {
-    match value {
-        Some(value) if !(value > 0.0 && value.is_finite()) => {
-            Err(Error::InvalidOption { name, value, domain: "positive and finite" })
-        }
-        _ => Ok(()),
+        require_positive("max_correspondence_distance_m", self.last_limit_m)?;
+        require_positive("initial_correspondence_distance_m", self.first_limit_m)?;
+        require_positive("step_fraction", self.step_fraction)?;
+        require_count("points", self.points, 1)?;
+        Ok(require_count("iterations", self.iterations, 1)?)
     }
 }

@@ -1,7 +1,8 @@
 //! Robust kernels in the course of a run.
 
+use rigid_pose::{require_count, require_positive};
+
 use super::scene::Moment;
-use super::{require_count, require_positive};
 use crate::error::Result;
 use crate::kernel::RobustKernel;
 
@@ -56,6 +57,6 @@ impl KernelSchedule for Graduated {
 
     fn validate(&self) -> Result<()> {
         require_positive("widest", self.widest)?;
-        require_count("half_life", self.half_life, 1)
+        Ok(require_count("half_life", self.half_life, 1)?)
     }
 }

@@ -37,22 +37,3 @@ pub(crate) use selection::thinned;
 pub use selection::{AllPoints, EveryNth, NormalSpace, PointSelection, RandomPoints, Stability};
 pub use stopping::{Progress, Settled, StoppingRule};
 pub use weighting::{ConstantWeight, DistanceWeight, IntensityWeight, NormalWeight, PairWeighting, SigmaWeight};
-
-use crate::error::{Error, Result};
-
-/// Refuses a parameter of a part that is not positive and finite.
-fn require_positive(name: &'static str, value: f64) -> Result<()> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(Error::InvalidOption { name, value, domain: "positive and finite" })
-}
-
-/// Refuses a count below `least` (1, 2 or 3).
-fn require_count(name: &'static str, value: usize, least: usize) -> Result<()> {
-    if value >= least {
-        return Ok(());
-    }
-    let domain = ["1 or more", "2 or more", "3 or more"][least.clamp(1, 3) - 1];
-    Err(Error::InvalidOption { name, value: value as f64, domain })
-}

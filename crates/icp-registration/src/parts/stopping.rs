@@ -1,6 +1,7 @@
 //! When the iterations of the last level end.
 
-use super::{require_count, require_positive};
+use rigid_pose::{require_count, require_positive};
+
 use crate::error::Result;
 use crate::result::StopReason;
 
@@ -75,6 +76,6 @@ impl StoppingRule for Settled {
         require_count("max_iterations", self.max_iterations, 1)?;
         require_count("patience", self.patience, 1)?;
         require_positive("noise_fraction", self.noise_fraction)?;
-        self.step_tolerance_m.map_or(Ok(()), |tolerance| require_positive("step_tolerance_m", tolerance))
+        Ok(require_positive("step_tolerance_m", self.step_tolerance_m)?)
     }
 }

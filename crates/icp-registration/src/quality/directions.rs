@@ -41,7 +41,7 @@ impl Directions {
     /// out from its scatter between them. `rounding`: share of the largest information that rounding can imitate.
     ///
     /// # Errors
-    /// [`Error::Pose`](crate::Error::Pose) where the information is not finite.
+    /// [`rigid_pose::InputError::Numerical`] where the information is not finite.
     pub fn new(
         information: &Matrix6<f64>,
         score: impl Fn(&Matrix6<f64>) -> (Matrix6<f64>, f64),

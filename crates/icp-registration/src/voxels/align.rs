@@ -6,11 +6,11 @@ use super::cloud::VoxelCloud;
 use super::options::VoxelAlignmentOptions;
 use super::pairs::{Matcher, Pair, Partners, System, matched};
 use super::wide::{RULES, Wide};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kernel::RobustKernel;
 use crate::quality::{Cells, Residuals, Verdict};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
-use rigid_pose::{Centred, free_of, is_finite};
+use rigid_pose::{Centred, InputError, free_of, require_pose};
 
 /// Iterations that a coarse level may take.
 const LEVEL_ITERATIONS: usize = 8;
@@ -32,8 +32,8 @@ impl VoxelCloud {
     /// `[Rusinkiewicz2019]`, w from the scatter of their points and a robust kernel; voxels of falling size.
     ///
     /// # Errors
-    /// [`Error::TooFewCorrespondences`] where the clouds do not overlap or hold too few planes; [`Error::NonFinite`]
-    /// for the guess, [`Error::InvalidOption`].
+    /// [`InputError::TooFewCorrespondences`] where the clouds do not overlap or hold too few planes; [`InputError::NonFinite`]
+    /// for the guess, [`InputError::InvalidOption`].
     pub fn align(
         &self,
         source: &VoxelCloud,
@@ -41,9 +41,7 @@ impl VoxelCloud {
         options: &VoxelAlignmentOptions,
     ) -> Result<IcpResult> {
         options.validate()?;
-        if !is_finite(guess) {
-            return Err(Error::NonFinite { what: "the guess", index: 0 });
-        }
+        require_pose("the guess", guess)?;
         let (pairs, scratch) = (Vec::new(), Vec::new());
         let run = Run { target: self, source, options, pose: *guess, iterations: 0, held: None, pairs, scratch };
         run.finish(guess)
@@ -211,7 +209,14 @@ impl<'a> Run<'a> {
         if system.count < needed {
             let of = matcher.source.voxels.len();
             let max_distance_m = limit(matcher);
-            return Err(Error::TooFewCorrespondences { found: system.count, of, needed, max_distance_m, iteration });
+            return Err(InputError::TooFewCorrespondences {
+                found: system.count,
+                of,
+                needed,
+                max_distance_m,
+                iteration,
+            }
+            .into());
         }
         Ok(system)
     }

@@ -1,12 +1,14 @@
 //! A cloud prepared for registration.
 
+use rigid_pose::InputError;
+
 use super::level::Level;
 use super::numerics::gather::gather;
 use super::numerics::lattice::{Lattice, bounds};
 use super::numerics::moments::Moments;
 use super::options::VoxelOptions;
 use super::scale::voxel_size;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use point_cloud::Cloud;
 
 /// Levels end when so few voxels are left.
@@ -31,7 +33,7 @@ impl VoxelCloud {
     /// the rim are left out.
     ///
     /// # Errors
-    /// [`Error::Empty`], [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::NotPositive`] for the cloud;
+    /// [`InputError::Empty`], [`InputError::NonFinite`], [`InputError::LengthMismatch`], [`InputError::NotPositive`] for the cloud;
     /// [`Error::VoxelSize`] for a size that is not positive, or of which more than two million lie along the cloud.
     pub fn new(cloud: &Cloud, options: &VoxelOptions) -> Result<Self> {
         cloud.validate("the cloud of voxels")?;
@@ -44,7 +46,7 @@ impl VoxelCloud {
         let rim = cloud.rim.as_deref();
         let (keys, moments) = gather::<Moments>(&cloud.points, &lattice, |i| rim.is_none_or(|r| !r[i]), &());
         if keys.is_empty() {
-            return Err(Error::Empty { what: "the cloud without its rim" });
+            return Err(InputError::Empty { what: "the cloud without its rim" }.into());
         }
         let mut levels = vec![Level::finest(&lattice, keys, moments)];
         while let Some(last) = levels.last()

@@ -19,8 +19,8 @@ const SHORTEST_MEAN_NORMAL: f64 = 0.5;
 /// `voxel_m`.
 ///
 /// # Errors
-/// [`crate::Error::Empty`], [`crate::Error::NonFinite`], [`crate::Error::LengthMismatch`],
-/// [`crate::Error::NotPositive`] for the cloud; [`crate::Error::VoxelSize`] for a size that is not positive, or of which
+/// [`InputError::Empty`](rigid_pose::InputError::Empty), [`InputError::NonFinite`](rigid_pose::InputError::NonFinite), [`InputError::LengthMismatch`](rigid_pose::InputError::LengthMismatch),
+/// [`InputError::NotPositive`](rigid_pose::InputError::NotPositive) for the cloud; [`crate::Error::VoxelSize`] for a size that is not positive, or of which
 /// more than two million lie along the cloud.
 pub fn downsample(cloud: &Cloud, voxel_m: f64) -> Result<Cloud> {
     cloud.validate("the cloud to be thinned")?;

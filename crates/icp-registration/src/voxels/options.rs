@@ -1,6 +1,8 @@
 //! What can be chosen.
 
-use crate::error::{Error, Result};
+use rigid_pose::{require_count, require_positive};
+
+use crate::error::Result;
 use crate::kernel::RobustKernel;
 use crate::result::DegeneracyPolicy;
 
@@ -51,25 +53,10 @@ impl Default for VoxelAlignmentOptions {
 
 impl VoxelAlignmentOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        let lengths = [
-            ("max_start_error_m", self.max_start_error_m),
-            ("step_tolerance_m", self.step_tolerance_m),
-            ("max_motion_sigma_m", self.max_motion_sigma_m),
-        ];
-        for (name, value) in lengths {
-            if let Some(value) = value
-                && !(value > 0.0 && value.is_finite())
-            {
-                return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
-            }
-        }
-        let counts = [("max_iterations", self.max_iterations, 1), ("min_correspondences", self.min_correspondences, 6)];
-        for (name, value, least) in counts {
-            if value < least {
-                let domain = if least == 1 { "1 or more" } else { "6 or more" };
-                return Err(Error::InvalidOption { name, value: value as f64, domain });
-            }
-        }
-        Ok(())
+        require_positive("max_start_error_m", self.max_start_error_m)?;
+        require_positive("step_tolerance_m", self.step_tolerance_m)?;
+        require_positive("max_motion_sigma_m", self.max_motion_sigma_m)?;
+        require_count("max_iterations", self.max_iterations, 1)?;
+        Ok(require_count("min_correspondences", self.min_correspondences, 6)?)
     }
 }

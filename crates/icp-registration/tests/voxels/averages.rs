@@ -9,6 +9,7 @@ use point_cloud::Error as CloudError;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use rigid_pose::InputError;
 
 /// Points on a bent sheet with everything that a cloud can know.
 fn sheet(count: usize, seed: u64) -> Cloud {
@@ -97,13 +98,19 @@ proptest! {
 
 #[test]
 fn clouds_and_sizes_without_an_answer_are_refused() {
-    assert!(matches!(downsample(&Cloud::default(), 0.1), Err(Error::Cloud(CloudError::Empty { .. }))));
+    assert!(matches!(
+        downsample(&Cloud::default(), 0.1),
+        Err(Error::Cloud(CloudError::Input(InputError::Empty { .. })))
+    ));
     let cloud = sheet(100, 3);
     for voxel in [0.0, -0.1, f64::NAN, f64::INFINITY, 1e-8, 1e-310] {
         assert!(matches!(downsample(&cloud, voxel), Err(Error::VoxelSize { .. })), "{voxel}");
     }
     let nan = Cloud::new(vec![Point3::new(0.0, f64::NAN, 0.0)]);
-    assert!(matches!(downsample(&nan, 0.1), Err(Error::Cloud(CloudError::NonFinite { index: 0, .. }))));
+    assert!(matches!(
+        downsample(&nan, 0.1),
+        Err(Error::Cloud(CloudError::Input(InputError::NonFinite { index: 0, .. })))
+    ));
     // One cube for all is an answer.
     assert_eq!(downsample(&cloud, 1e9).unwrap().len(), 4);
 }

@@ -4,6 +4,7 @@ use icp_registration::{Error, IcpResult, VoxelAlignmentOptions, VoxelCloud, Voxe
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
+use rigid_pose::InputError;
 
 use super::scenes::bare;
 use crate::common::{Pinhole, frame_pair};
@@ -26,19 +27,19 @@ fn clouds_without_an_answer() {
             assert!(is(&error), "{error}");
         }
     };
-    both(&Cloud::default(), &|e| matches!(e, Error::Cloud(CloudError::Empty { .. })));
+    both(&Cloud::default(), &|e| matches!(e, Error::Cloud(CloudError::Input(InputError::Empty { .. }))));
     both(&Cloud::new(vec![Point3::new(f64::NAN, 0.0, 0.0); 30]), &|e| {
-        matches!(e, Error::Cloud(CloudError::NonFinite { index: 0, .. }))
+        matches!(e, Error::Cloud(CloudError::Input(InputError::NonFinite { index: 0, .. })))
     });
-    let few = |e: &Error| matches!(e, Error::TooFewCorrespondences { .. });
+    let few = |e: &Error| matches!(e, Error::Input(InputError::TooFewCorrespondences { .. }));
     both(&Cloud::new(vec![Point3::new(0.0, 0.0, -1.0)]), &few);
     both(&Cloud::new(vec![Point3::new(0.0, 0.0, -1.0); 500]), &few);
     both(&Cloud::new((0..500).map(|i| Point3::new(f64::from(i) * 0.01, 0.0, -1.0)).collect()), &few);
     both(&good.transformed(&Isometry3::translation(0.0, 1e6, 0.0)), &few);
     let rim = Cloud { rim: Some(vec![true; good.len()]), ..good.clone() };
-    both(&rim, &|e| matches!(e, Error::Empty { .. }));
+    both(&rim, &|e| matches!(e, Error::Input(InputError::Empty { .. })));
     both(&Cloud { normals: Some(vec![]), ..good.clone() }, &|e| {
-        matches!(e, Error::Cloud(CloudError::LengthMismatch { .. }))
+        matches!(e, Error::Cloud(CloudError::Input(InputError::LengthMismatch { .. })))
     });
 }
 
@@ -55,14 +56,14 @@ fn options_outside_their_domain() {
         VoxelAlignmentOptions { min_correspondences: 5, ..default() },
     ] {
         let result = prepared.align(&prepared, &Isometry3::identity(), &options);
-        assert!(matches!(result, Err(Error::InvalidOption { .. })), "{options:?}");
+        assert!(matches!(result, Err(Error::Input(InputError::InvalidOption { .. }))), "{options:?}");
     }
     for voxel_m in [0.0, -1.0, f64::NAN, 1e-9, 1e-320] {
         let cut = VoxelOptions { voxel_m: Some(voxel_m) };
         assert!(matches!(VoxelCloud::new(&good, &cut), Err(Error::VoxelSize { .. })), "{voxel_m}");
     }
     let nowhere = Isometry3::translation(f64::NAN, 0.0, 0.0);
-    assert!(matches!(prepared.align(&prepared, &nowhere, &default()), Err(Error::NonFinite { .. })));
+    assert!(matches!(prepared.align(&prepared, &nowhere, &default()), Err(Error::Input(InputError::NonFinite { .. }))));
 }
 
 #[test]

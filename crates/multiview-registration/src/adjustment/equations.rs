@@ -1,98 +1,195 @@
-//! The normal equations of all stations and shared parameters.
+//! The normal equations of all stations and of what they share, of whose blocks few are filled in a large network.
+//!
+//! A plane that a few stations saw is eliminated, and couples them with each other. One that very many saw, as the floor of a
+//! building, stays beside them: eliminated, it would fill the whole matrix.
 
-use nalgebra::{DMatrix, DVector, Isometry3};
+use nalgebra::{Const, DMatrix, DVector, Dyn, Isometry3, Matrix3, Matrix6, Matrix6x3, OMatrix, U6};
+use rigid_pose::{InputError, pose_difference};
+use sparse_matrices::BlockMatrix;
 
 use crate::adjustment::cofactors::Cofactors;
-use crate::adjustment::network::{Network, State};
+use crate::adjustment::known::Known;
 use crate::adjustment::turns::MeasuredTurn;
-use crate::error::{Error, Result};
-use crate::planes::elimination::{Eliminated, Products, motion_of};
+use crate::error::Result;
+use crate::planes::elimination::{Eliminated, Products, WideProducts, motion_of};
 use crate::planes::shared_planes::SharedPlane;
+use crate::surfaces::point_model::Prior;
 
-/// Normal equations of all stations and parameters as whole matrices.
+/// Stations that saw a plane beyond which it stays beside them. Those of one room see its walls from so many stations; with 12 or
+/// 48 the work is the same within a tenth.
+pub(crate) const MOST_ELIMINATED: usize = 24;
+
+/// Rows of some observations by the pose of a station.
+pub(crate) type Rows = OMatrix<f64, Dyn, U6>;
+
+/// Normal equations: six unknowns a station, the shared parameters, then three for each plane that stays.
 pub(crate) struct Equations {
-    pub normal: DMatrix<f64>,
-    pub right: DVector<f64>,
+    normal: BlockMatrix,
+    right: DVector<f64>,
+    /// Their number, and the block of the shared parameters.
     stations: usize,
+    /// The next plane that stays.
+    next: usize,
 }
 
 impl Equations {
-    pub(crate) fn new(stations: usize, parameters: usize) -> Self {
-        let size = 6 * stations + parameters;
-        Self { normal: DMatrix::zeros(size, size), right: DVector::zeros(size), stations }
+    /// `fixed`: the station that keeps its pose, if any; `planes`: how many stay beside the stations.
+    pub(crate) fn new(stations: usize, fixed: Option<usize>, parameters: usize, planes: usize) -> Self {
+        let mut widths: Vec<usize> = (0..stations).map(|station| if Some(station) == fixed { 0 } else { 6 }).collect();
+        widths.push(parameters);
+        widths.resize(stations + 1 + planes, 3);
+        let normal = BlockMatrix::new(&widths);
+        let right = DVector::zeros(normal.order());
+        Self { normal, right, stations, next: stations + 1 }
     }
 
-    pub fn add(&mut self, shared_plane: &SharedPlane, eliminated: &Eliminated, poses: &[Isometry3<f64>]) {
-        let count = eliminated.stations.len();
-        let parameters = self.right.len() - 6 * self.stations;
-        // Columns: the unknowns of the shared plane, then all.
-        let mut to_all = DMatrix::zeros(eliminated.right.len(), 6 * count + parameters);
-        for (k, &station) in eliminated.stations.iter().enumerate() {
-            let motion = motion_of(shared_plane, &poses[station]).transpose();
-            to_all.fixed_view_mut::<3, 6>(3 * k, 6 * k).copy_from(&motion);
+    pub(crate) fn add(&mut self, shared_plane: &SharedPlane, eliminated: &Eliminated, poses: &[Isometry3<f64>]) {
+        let motions: Vec<Matrix6x3<f64>> =
+            eliminated.stations.iter().map(|&station| motion_of(shared_plane, &poses[station])).collect();
+        for (k, (&station, motion)) in eliminated.stations.iter().zip(&motions).enumerate() {
+            self.add_right(station, (motion * eliminated.right.fixed_rows::<3>(3 * k)).as_slice());
         }
-        for k in 0..parameters {
-            to_all[(3 * count + k, 6 * count + k)] = 1.0;
-        }
-        let Products::Eliminated(normal) = &eliminated.products else { return };
-        let normal = to_all.transpose() * normal * &to_all;
-        let right = to_all.transpose() * &eliminated.right;
-        let place = |k: usize| match eliminated.stations.get(k / 6) {
-            Some(station) => 6 * station + k % 6,
-            None => 6 * self.stations + k - 6 * count,
-        };
-        for row in 0..right.len() {
-            for column in 0..right.len() {
-                self.normal[(place(row), place(column))] += normal[(row, column)];
+        match &eliminated.products {
+            Products::Eliminated(products) => {
+                for a in 0..motions.len() {
+                    for b in 0..=a {
+                        let own: Matrix3<f64> = products.fixed_view::<3, 3>(3 * a, 3 * b).into_owned();
+                        self.add_pair(&eliminated.stations, &motions, (a, b), &own);
+                    }
+                }
+                self.add_shared(eliminated, products, &motions);
             }
-            self.right[place(row)] += right[row];
+            Products::Beside(wide) => self.add_wide(&eliminated.stations, &motions, wide),
+        }
+    }
+
+    fn add_right(&mut self, block: usize, values: &[f64]) {
+        let own = self.right.rows_mut(self.normal.start(block), self.normal.width(block));
+        own.into_iter().zip(values).for_each(|(sum, value)| *sum += value);
+    }
+
+    fn add_pair(
+        &mut self,
+        stations: &[usize],
+        motions: &[Matrix6x3<f64>],
+        (a, b): (usize, usize),
+        products: &Matrix3<f64>,
+    ) {
+        let block = motions[a] * products * motions[b].transpose();
+        self.normal.add(stations[a], stations[b], |i, j| block[(i, j)]);
+    }
+
+    /// What a plane says of the shared parameters.
+    fn add_shared(&mut self, eliminated: &Eliminated, products: &DMatrix<f64>, motions: &[Matrix6x3<f64>]) {
+        let (first, count) = (3 * motions.len(), self.normal.width(self.stations));
+        if count == 0 {
+            return;
+        }
+        for (k, (&station, motion)) in eliminated.stations.iter().zip(motions).enumerate() {
+            let block = products.view((first, 3 * k), (count, 3)) * motion.transpose();
+            self.normal.add(self.stations, station, |i, j| block[(i, j)]);
+        }
+        let own = products.view((first, first), (count, count));
+        self.normal.add(self.stations, self.stations, |i, j| 0.5 * (own[(i, j)] + own[(j, i)]));
+        self.add_right(self.stations, &eliminated.right.as_slice()[first..]);
+    }
+
+    fn add_wide(&mut self, stations: &[usize], motions: &[Matrix6x3<f64>], wide: &WideProducts) {
+        for (&pair, products) in &wide.pairs {
+            self.add_pair(stations, motions, pair, products);
+        }
+        let plane = self.next;
+        self.next += 1;
+        for (k, (&station, motion)) in stations.iter().zip(motions).enumerate() {
+            let block = wide.with_plane.fixed_view::<3, 3>(0, 3 * k) * motion.transpose();
+            self.normal.add(plane, station, |i, j| block[(i, j)]);
+        }
+        self.normal.add(plane, plane, |i, j| 0.5 * (wide.of_plane[(i, j)] + wide.of_plane[(j, i)]));
+        self.add_right(plane, wide.right.as_slice());
+    }
+
+    /// Adds rows that two stations, and the shared parameters where some are given, take part in, with what is left of them.
+    pub(crate) fn add_rows(
+        &mut self,
+        stations: [usize; 2],
+        rows: [&Rows; 2],
+        shared: Option<&DMatrix<f64>>,
+        residual: &DVector<f64>,
+    ) {
+        for (n, (own, station)) in rows.iter().zip(stations).enumerate() {
+            for (other_rows, other) in rows.iter().zip(stations).take(n + 1) {
+                let block: Matrix6<f64> = own.transpose() * *other_rows;
+                self.normal.add(station, other, |i, j| block[(i, j)]);
+            }
+            self.add_right(station, (own.transpose() * residual).as_slice());
+            if let Some(shared) = shared {
+                let block = shared.transpose() * *own;
+                self.normal.add(self.stations, station, |i, j| block[(i, j)]);
+            }
+        }
+        if let Some(shared) = shared {
+            let block = shared.transpose() * shared;
+            self.normal.add(self.stations, self.stations, |i, j| block[(i, j)]);
+            self.add_right(self.stations, (shared.transpose() * residual).as_slice());
+        }
+    }
+
+    /// Poses are held where they were by the priors that [`Self::cofactors`] adds.
+    pub(crate) fn hold(&mut self, known: Known, at: &[Isometry3<f64>], now: &[Isometry3<f64>]) {
+        for station in 0..self.stations {
+            let moved = pose_difference(&at[station], &now[station]);
+            let weighted: Vec<f64> = (0..6).map(|k| moved[k] * known.weight(k)).collect();
+            self.add_right(station, &weighted);
+        }
+    }
+
+    /// Shared parameters are observed as what is known of them beforehand.
+    pub(crate) fn add_prior(&mut self, prior: &Prior, now: &[f64]) {
+        let first = self.normal.start(self.stations);
+        for (k, ((value, sigma), now)) in prior.0.iter().zip(&prior.1).zip(now).enumerate() {
+            // None where nothing is known.
+            let weight = sigma.powi(-2);
+            self.normal.add_to_diagonal(first + k, weight);
+            self.right[first + k] += weight * (now - value);
         }
     }
 
     /// Adds a turn that was measured between two stations.
     pub(crate) fn add_turn(&mut self, turn: &MeasuredTurn, poses: &[Isometry3<f64>]) {
         let Some((residual, by)) = turn.linearised(poses) else { return };
-        let places = [6 * turn.first, 6 * turn.second];
-        for (by_row, row) in by.iter().zip(places) {
-            for (by_column, column) in by.iter().zip(places) {
-                let mut block = self.normal.fixed_view_mut::<6, 6>(row, column);
-                block += by_row.transpose() * by_column;
-            }
-            let mut right = self.right.fixed_rows_mut::<6>(row);
-            right += by_row.transpose() * residual;
-        }
+        let [first, second] = by.map(|by| OMatrix::from_fn_generic(Dyn(3), Const::<6>, |row, k| by[(row, k)]));
+        let residual = DVector::from_column_slice(residual.as_slice());
+        self.add_rows([turn.first, turn.second], [&first, &second], None, &residual);
     }
 
-    /// The step that minimises the squares, with priors that hold what nothing determines, and the cofactors.
-    pub(crate) fn solved(&self, network: &Network<'_>, state: &State) -> Result<(DVector<f64>, Cofactors)> {
-        let of_poses = 6 * self.stations;
-        let (mut normal, mut right) = (self.normal.clone(), self.right.clone());
-        for k in 0..of_poses {
-            normal[(k, k)] += if k % 6 < 3 { network.hold_m.powi(-2) } else { network.turn_rad.powi(-2) };
-        }
-        for (k, (sigma, value)) in network.prior.1.iter().zip(&network.prior.0).enumerate() {
-            let weight = if sigma.is_finite() { sigma.powi(-2) } else { 0.0 };
-            normal[(of_poses + k, of_poses + k)] += weight;
-            right[of_poses + k] += weight * (state.parameters[k] - value);
-        }
-        let (size, held) = (right.len(), 6 * network.fixed);
-        let free: Vec<usize> = (0..size).filter(|k| !(held..held + 6).contains(k)).collect();
-        let scale: Vec<f64> = free.iter().map(|&k| normal[(k, k)].sqrt().recip()).collect();
-        let n = free.len();
-        let scaled = DMatrix::from_fn(n, n, |r, c| {
-            0.5 * (normal[(free[r], free[c])] + normal[(free[c], free[r])]) * scale[r] * scale[c]
-        });
-        let failed = |why| Error::Numerical { what: "the normal equations of all stations", why };
-        if scaled.iter().chain(right.iter()).any(|value| !value.is_finite()) {
-            return Err(failed("they are not finite"));
-        }
-        let inverse = scaled.cholesky().ok_or(failed("an unknown is not determined"))?.inverse();
-        let mut cofactors = DMatrix::zeros(size, size);
-        for (r, &row) in free.iter().enumerate() {
-            for (c, &column) in free.iter().enumerate() {
-                cofactors[(row, column)] = inverse[(r, c)] * scale[r] * scale[c];
+    /// Cofactors, with priors that hold what nothing determines.
+    pub(crate) fn cofactors(&self, known: Known) -> Result<Cofactors> {
+        let mut normal = self.normal.clone();
+        for station in (0..self.stations).filter(|station| self.normal.width(*station) > 0) {
+            for k in 0..6 {
+                normal.add_to_diagonal(self.normal.start(station) + k, known.weight(k));
             }
         }
-        Ok((-(&cofactors * &right), Cofactors::Whole { matrix: cofactors, stations: self.stations }))
+        let failed = |why| InputError::Numerical { what: "the normal equations of all stations", why };
+        if normal.diagonal().iter().chain(self.right.iter()).any(|value| !value.is_finite()) {
+            return Err(failed("they are not finite").into());
+        }
+        let factor = normal.factor().ok_or(failed("an unknown is not determined"))?;
+        Ok(Cofactors::new(factor, (0..=self.stations + 1).map(|block| normal.start(block)).collect()))
+    }
+
+    /// The step that minimises the squares: six rows a station, then the shared parameters.
+    pub(crate) fn step(&self, cofactors: &Cofactors) -> DVector<f64> {
+        let mut step = DVector::zeros(cofactors.unknowns());
+        let solved = cofactors.times(&self.right);
+        for block in 0..=self.stations {
+            let (first, width) = (self.normal.start(block), self.normal.width(block));
+            step.rows_mut(6 * block, width).copy_from(&-solved.rows(first, width));
+        }
+        step
     }
 }
+
+#[cfg(test)]
+#[path = "../../tests/inside/equations.rs"]
+mod tests;

@@ -1,10 +1,9 @@
 //! What rays tell of the relative pose of two stations where hardly any surface does.
 
-use nalgebra::{DVector, Dyn, Isometry3, OMatrix, RowVector6, U6, Vector6};
+use nalgebra::{DVector, Isometry3, RowVector6, Vector6};
 
-use crate::adjustment::network::relative_jacobians;
-use crate::adjustment::sparse_equations::SparseEquations;
-use rigid_pose::pose_difference;
+use crate::adjustment::equations::{Equations, Rows};
+use rigid_pose::{pose_difference, relative_jacobians};
 
 /// A relative pose that is observed along one motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,11 +19,13 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    pub(crate) fn add_to(&self, equations: &mut SparseEquations, poses: &[Isometry3<f64>]) {
+    pub(crate) fn add_to(&self, equations: &mut Equations, poses: &[Isometry3<f64>]) {
         let [first, second] = self.stations.map(|station| poses[station]);
-        let off = pose_difference(&(first.inverse() * second), &self.first_from_second);
+        let relative = first.inverse() * second;
+        let off = pose_difference(&relative, &self.first_from_second);
         let row: RowVector6<f64> = self.along.transpose() / self.sigma_m;
-        let rows = relative_jacobians(&first, &second).map(|by| OMatrix::<f64, Dyn, U6>::from_rows(&[row * by]));
-        equations.add_rows(self.stations, [&rows[0], &rows[1]], &DVector::from_element(1, -row.transpose().dot(&off)));
+        let rows = relative_jacobians(&first, &relative).map(|by| Rows::from_rows(&[row * by]));
+        let residual = DVector::from_element(1, -row.transpose().dot(&off));
+        equations.add_rows(self.stations, [&rows[0], &rows[1]], None, &residual);
     }
 }

@@ -2,33 +2,27 @@
 
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
-use statistics::{mad_scale, upper_median};
+use rigid_pose::InputError;
+use statistics::mad_scale;
 
+use crate::adjustment::known::Known;
 use crate::adjustment::network::{Anchors, Network, State, largest_step};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::planes::contacts::{Contact, Reach, TURNED, partners};
-use crate::planes::reduction::{PairContacts, Reduced, Scene, Weighting, reduce};
+use crate::planes::reduction::{PairContacts, Reduced, Scene, reduce};
 use crate::surfaces::extents::{Extent, Extents};
 use crate::surfaces::patches::Surface;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::point_model::PointModel;
 use crate::surfaces::points::StationPoints;
-use icp_registration::RobustKernel;
-use rigid_pose::pose_difference;
 
 /// Most rounds of a level, and the part of its limit that a step must be below for it to end.
 const ROUNDS: usize = 8;
 const SMALL_STEP: f64 = 100.0;
 /// Fewest patches, or tiles, in which two stations must meet to be held together: a few meet by chance anywhere.
 pub(crate) const FEWEST_CONTACTS: usize = 15;
-/// While stations are still apart, what is far off keeps some weight.
-const KERNEL: RobustKernel = RobustKernel::Huber;
 /// Nearest patches that are looked at while stations are still apart.
 const CANDIDATES: usize = 8;
-/// Median length of a vector of three components of unit variance.
-const MEDIAN_OF_THREE: f64 = 1.538_172;
-/// Part of a patch that start poses are not taken to be better known than: from there the last rounds find their way.
-pub(crate) const KNOWN: f64 = 0.25;
 
 /// Derivatives of the patches of each station by all parameters, patch by patch.
 pub(crate) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
@@ -89,9 +83,9 @@ fn at_parameters(
     for index in surface.members.iter().map(|&index| index as usize) {
         points[index] = model.point(station, index, parameters, Some(&mut of_points[index * m..(index + 1) * m]));
     }
-    point_cloud::check_points("points of the point model", &points)?;
+    rigid_pose::require_points("points of the point model", &points)?;
     if let Some(index) = of_points.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
-        return Err(Error::NonFinite { what: "derivatives of the point model", index });
+        return Err(InputError::NonFinite { what: "derivatives of the point model", index }.into());
     }
     let surface = surface.refitted(&points)?;
     let derivatives = averaged(&surface, &of_points, m);
@@ -124,8 +118,8 @@ pub(crate) fn near_each_other(
     let size_m = surfaces.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
     let extent = |(surface, pose): (&&Surface, &Isometry3<f64>)| {
         let centres = surface.patches.iter().map(|patch| &patch.centre);
-        if let Some(index) = centres.clone().position(|centre| !point_cloud::is_usable(&(pose * centre))) {
-            return Err(Error::NonFinite { what: "points of a station in the frame of another", index });
+        if let Some(index) = centres.clone().position(|centre| !rigid_pose::is_usable(&(pose * centre))) {
+            return Err(InputError::NonFinite { what: "points of a station in the frame of another", index }.into());
         }
         Ok(Extent::placed(centres, pose))
     };
@@ -198,33 +192,6 @@ fn scale(scene: &Scene<'_>, pairs_in_contact: &[PairContacts], poses: &[Isometry
     mad_scale(&mut residuals).max(1e-3)
 }
 
-/// How well start poses are known: standard deviations of a component of the position, metre, and of the attitude, radian.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Known {
-    pub position_m: f64,
-    attitude_rad: f64,
-}
-
-impl Known {
-    /// From how far stations have moved since: half of them no farther than `MEDIAN_OF_THREE` deviations. Those that have slid to
-    /// where they should not be are fewer.
-    pub(crate) fn estimated(start: &[Isometry3<f64>], now: &[Isometry3<f64>], least: Self, most: Self) -> Self {
-        let moved = |part: usize| {
-            let norm = |(a, b): (&Isometry3<f64>, &Isometry3<f64>)| pose_difference(a, b).fixed_rows::<3>(part).norm();
-            upper_median(&mut start.iter().zip(now).map(norm).collect::<Vec<f64>>()) / MEDIAN_OF_THREE
-        };
-        Self {
-            position_m: moved(0).max(least.position_m).min(most.position_m),
-            attitude_rad: moved(3).max(least.attitude_rad).min(most.attitude_rad),
-        }
-    }
-
-    /// The same length for positions and for what is at this distance.
-    pub(crate) fn at(length_m: f64, radius_m: f64) -> Self {
-        Self { position_m: length_m, attitude_rad: length_m / radius_m }
-    }
-}
-
 /// How the rounds go.
 #[derive(Clone, Copy)]
 pub(crate) struct WideRounds<'a> {
@@ -258,11 +225,10 @@ impl WideRounds<'_> {
         reduced: &[(&PairContacts, Reduced)],
         scale: f64,
     ) -> Result<State> {
-        if self.network.whole {
-            return self.network.solve(state, reduced);
-        }
-        let network = Network { hold_m: known.position_m, turn_rad: known.attitude_rad, ..*self.network };
-        network.solve_sparse(state, reduced, &Anchors { poses: start, factor: scale * scale })
+        let (network, poses) = (self.network, &state.poses[..]);
+        let few = Anchors { fixed: Some(network.fixed), poses, known: network.held(), factor: 1.0 };
+        let many = Anchors { fixed: None, poses: start, known, factor: scale * scale };
+        network.solve(state, reduced, if network.whole { &few } else { &many })
     }
 
     /// Brings all stations from start poses that are right to about the reach to a part of a patch.
@@ -270,8 +236,8 @@ impl WideRounds<'_> {
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
         let mut state = start.clone();
         let mut rounds = 0;
-        let [least, most] = [KNOWN * size_m, self.reach_m].map(|length_m| Known::at(length_m, self.network.hold_m));
-        let mut known = most;
+        let radius_m = self.network.hold_m;
+        let mut known = Known::at(self.reach_m, radius_m);
         for reach in self.levels(size_m) {
             let mut pairs = Vec::new();
             for in_level in 0..ROUNDS {
@@ -288,12 +254,12 @@ impl WideRounds<'_> {
                         .map(|pair_contacts| (pair_contacts.target, pair_contacts.source))
                         .collect();
                 }
-                let weighting = Weighting { kernel: KERNEL, scale: scale(&scene, &pairs_in_contact, &state.poses) };
-                let reduced = reduced(&scene, &pairs_in_contact, &state.poses, &weighting)?;
-                let next = self.solved(&state, (&start.poses, known), &reduced, weighting.scale)?;
-                let moved_m = largest_step(&state, &next, self.network.hold_m);
+                let scale = scale(&scene, &pairs_in_contact, &state.poses);
+                let reduced = reduced(&scene, &pairs_in_contact, &state.poses, scale)?;
+                let next = self.solved(&state, (&start.poses, known), &reduced, scale)?;
+                let moved_m = largest_step(&state, &next, radius_m);
                 state = next;
-                known = Known::estimated(&start.poses, &state.poses, least, most);
+                known = Known::estimated(&start.poses, &state.poses, (size_m, self.reach_m), radius_m);
                 rounds += 1;
                 (self.progress)(rounds);
                 if moved_m <= reach.across_m / SMALL_STEP {
@@ -309,11 +275,11 @@ fn reduced<'m>(
     scene: &Scene<'_>,
     pairs_in_contact: &'m [PairContacts],
     poses: &[Isometry3<f64>],
-    weighting: &Weighting,
+    scale: f64,
 ) -> Result<Vec<(&'m PairContacts, Reduced)>> {
     let reduce = |pair_contacts: &'m PairContacts| {
         let pose = poses[pair_contacts.target].inverse() * poses[pair_contacts.source];
-        Ok((pair_contacts, reduce(scene, pair_contacts, &pose, weighting)?))
+        Ok((pair_contacts, reduce(scene, pair_contacts, &pose, scale)?))
     };
     pairs_in_contact.par_iter().map(reduce).collect()
 }

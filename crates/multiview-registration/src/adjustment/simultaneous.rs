@@ -6,11 +6,11 @@ use nalgebra::{DVector, Isometry3};
 use rayon::prelude::*;
 
 use crate::adjustment::cofactors::Cofactors;
-use crate::adjustment::equations::Equations;
+use crate::adjustment::equations::{Equations, MOST_ELIMINATED};
 use crate::adjustment::joints::Joint;
+use crate::adjustment::known::Known;
 use crate::adjustment::network::{Network, State, largest_step};
 use crate::adjustment::rounds::{Surfaces, meet, near_each_other};
-use crate::adjustment::sparse_equations::{MOST_ELIMINATED, SparseEquations};
 use crate::adjustment::wide_errors::Residuals;
 use crate::error::Result;
 use crate::planes::contacts::Reach;
@@ -21,8 +21,7 @@ use crate::planes::sightings::{Gate, sightings};
 use crate::planes::sums::Sums;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::points::StationPoints;
-use icp_registration::RobustKernel;
-use rigid_pose::{pose_difference, step_pose};
+use rigid_pose::pose_difference;
 
 /// What the poses may be off in the first rounds, patches: shared planes are joined anew from better poses.
 const OFF: [f64; 2] = [0.06, 0.01];
@@ -32,8 +31,6 @@ const FIRST_STRIDE: usize = 3;
 
 /// Most rounds, each with points given to the surfaces anew; most surveys are settled after four or five.
 pub(crate) const MOST_ROUNDS: usize = 12;
-/// For single points and for what a station saw of a tile: what is no common surface has no weight.
-const KERNEL: RobustKernel = RobustKernel::Tukey;
 /// Part of its standard deviation by which a station may still move.
 const FEW_SIGMAS: f64 = 0.1;
 
@@ -48,7 +45,8 @@ pub(crate) struct Adjusted {
     pub variances: Vec<Variances>,
     /// Inverse of the normal matrix, zero for the station that is held.
     pub cofactors: Cofactors,
-    /// Factor of the cofactors that makes covariances of them.
+    /// Factor of the cofactors that makes covariances of them: what tiles scatter beyond the noise of their points is not independent
+    /// from tile to tile, and so more than the weights that it takes from them; errors that whole shared planes share are more still.
     pub factor: f64,
     pub rounds: usize,
     pub settled: bool,
@@ -108,12 +106,6 @@ impl Adjusted {
         (redundancy > 0).then(|| (self.scatter.squares / redundancy as f64).sqrt())
     }
 
-    /// Factor of the covariance: what tiles scatter beyond the noise of their points is not independent from tile to tile,
-    /// and so more than the weights that it takes from them; errors that whole shared planes share are more still.
-    pub(crate) fn variance_factor(&self) -> f64 {
-        self.factor
-    }
-
     /// Of many stations that factor is found once, at the end of all rounds.
     pub(crate) fn with_factor(mut self) -> Self {
         self.factor = self.factor_on(&self.shared_planes);
@@ -144,7 +136,7 @@ pub(crate) struct Finish<'a> {
     pub network: &'a Network<'a>,
     /// The same with poses held at what the rounds start from: along a direction that the surfaces leave open, shared planes
     /// farther off would be others.
-    pub near: Network<'a>,
+    pub near: Known,
     /// Movement at which the rounds end, metre.
     pub tolerance_m: f64,
     /// Rounds after which they end all the same.
@@ -178,7 +170,7 @@ impl Finish<'_> {
             }
             let first = round == 0;
             let (slack_m, stride) = if first { (OFF[0] * size_m, FIRST_STRIDE) } else { (0.0, 1) };
-            let gate = Gate { kernel: KERNEL, slack_m, stride, parameters: state.parameters.len() };
+            let gate = Gate { slack_m, stride, parameters: state.parameters.len() };
             let sums = sightings(points, &state.poses, &known, gate);
             let before = state.clone();
             let adjusted = self.step(&mut state, &mut known, sums)?;
@@ -186,8 +178,7 @@ impl Finish<'_> {
             (self.progress)(round);
             let settled = off_m.is_none() && self.settles(&before, &state, &adjusted, &known);
             if settled || round >= self.most_rounds {
-                let whole = self.network.whole;
-                let factor = if whole { adjusted.factor_on(&known) } else { adjusted.factor_of_tiles() };
+                let factor = self.factor(&adjusted, &known);
                 let common = Common::new(state.poses.len(), &adjusted.means);
                 let shared_planes = known;
                 return Ok(Adjusted {
@@ -210,8 +201,7 @@ impl Finish<'_> {
         if largest_step(before, after, self.network.hold_m) <= self.tolerance_m {
             return true;
         }
-        // Of many stations the factor takes as long as a round; without it the demand is stricter.
-        let factor = if self.network.whole { adjusted.factor_on(shared_planes) } else { adjusted.factor_of_tiles() };
+        let factor = self.factor(adjusted, shared_planes);
         let cofactors = &adjusted.cofactors;
         let is_settled = |k: usize| {
             let step = pose_difference(&before.poses[k], &after.poses[k]);
@@ -223,6 +213,11 @@ impl Finish<'_> {
         (0..after.poses.len()).all(is_settled)
     }
 
+    /// Of many stations the factor takes as long as a round; without it what is asked before rounds end is stricter.
+    fn factor(&self, adjusted: &Adjusted, shared_planes: &[SharedPlane]) -> f64 {
+        if self.network.whole { adjusted.factor_on(shared_planes) } else { adjusted.factor_of_tiles() }
+    }
+
     /// What the stations saw of each tile about the planes at the present poses, and how that scatters.
     fn scatter(&self, known: &[SharedPlane], sums: &[Sums], observers: &[Vec<usize>]) -> (Vec<Vec<TileMean>>, Scatter) {
         let of_shared_plane = |(shared_plane, stations): (&SharedPlane, &Vec<usize>)| {
@@ -231,7 +226,7 @@ impl Finish<'_> {
             eliminated.map_or_else(Vec::new, |eliminated| tile_means(&seen, &eliminated))
         };
         let means: Vec<Vec<TileMean>> = known.par_iter().zip(observers).map(of_shared_plane).collect();
-        let scatter = between(&means, sums, KERNEL);
+        let scatter = between(&means, sums);
         (means, scatter)
     }
 
@@ -247,7 +242,6 @@ impl Finish<'_> {
                 seen.eliminated(&observers[k], variances[k], self.most_eliminated())
             })
             .collect();
-        let parameters = state.parameters.len();
         let seen = known.iter().zip(&eliminated).filter_map(|(plane, eliminated)| Some((plane, eliminated.as_ref()?)));
         let (step, cofactors) = self.solved(state, seen)?;
         for (shared_plane, eliminated) in known.iter_mut().zip(&eliminated) {
@@ -256,11 +250,7 @@ impl Finish<'_> {
                 shared_plane.moved(&eliminated.plane(&motions));
             }
         }
-        for (k, pose) in state.poses.iter_mut().enumerate() {
-            *pose = step_pose(pose, &step.fixed_rows::<6>(6 * k).into_owned());
-        }
-        let shared = step.rows(6 * state.poses.len(), parameters);
-        state.parameters.iter_mut().zip(shared.iter()).for_each(|(value, step)| *value += step);
+        state.moved(&step);
         let state = state.clone();
         Ok(Adjusted {
             state,
@@ -289,27 +279,19 @@ impl Finish<'_> {
         state: &State,
         seen: impl Iterator<Item = (&'s SharedPlane, &'s Eliminated)> + Clone,
     ) -> Result<(DVector<f64>, Cofactors)> {
-        let stations = state.poses.len();
-        if self.network.whole {
-            let mut equations = Equations::new(stations, state.parameters.len());
-            seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
-            for turn in self.network.turns {
-                equations.add_turn(turn, &state.poses);
-            }
-            let (step, _) = equations.solved(&self.near, state)?;
-            return Ok((step, equations.solved(self.network, state)?.1));
-        }
+        let network = self.network;
         let planes = seen.clone().filter(|(_, eliminated)| matches!(eliminated.products, Products::Beside(_))).count();
-        let mut equations = SparseEquations::new(stations, self.network.fixed, planes);
+        let mut equations = Equations::new(state.poses.len(), Some(network.fixed), state.parameters.len(), planes);
         seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
-        for turn in self.network.turns {
+        equations.add_prior(network.prior, &state.parameters);
+        for turn in network.turns {
             equations.add_turn(turn, &state.poses);
         }
         for joint in &self.joints {
             joint.add_to(&mut equations, &state.poses);
         }
-        let step = equations.step(&equations.cofactors(&self.near)?);
-        Ok((step, equations.cofactors(self.network)?))
+        let step = equations.step(&equations.cofactors(self.near)?);
+        Ok((step, equations.cofactors(network.held())?))
     }
 }
 
@@ -339,9 +321,7 @@ fn motions(
         let motion = motion_of(shared_plane, &poses[station]).transpose() * step.fixed_rows::<6>(6 * station);
         motions.fixed_rows_mut::<3>(3 * k).copy_from(&motion);
     }
-    let (of_motions, of_poses) = (3 * eliminated.stations.len(), 6 * poses.len());
-    for k in of_motions..motions.len() {
-        motions[k] = step[of_poses + k - of_motions];
-    }
+    let shared = step.rows_range(6 * poses.len()..);
+    motions.rows_mut(3 * eliminated.stations.len(), shared.len()).copy_from(&shared);
     motions
 }

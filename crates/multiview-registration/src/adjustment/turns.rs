@@ -1,10 +1,9 @@
 //! Turns between stations that something else measures: an inertial unit.
 
-use adjust::RigidPose;
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, UnitQuaternion, Vector3};
+use rigid_pose::InputError;
 
 use crate::error::{Error, Result};
-use crate::planes::reduction::Reduced;
 use crate::relative_pose::relative_pose_parts;
 
 /// Angle, radian, by which a pose that features propose may differ from what was measured: voxels leave some degrees.
@@ -35,7 +34,11 @@ impl MeasuredTurn {
         }
         let whole = self.first_from_second.coords.iter().all(|value| value.is_finite()) && self.first != self.second;
         if !whole || self.whitening().is_none() {
-            return Err(Error::NonFinite { what: "turns between stations, or their covariance", index: self.first });
+            return Err(InputError::NonFinite {
+                what: "turns between stations, or their covariance",
+                index: self.first,
+            }
+            .into());
         }
         Ok(())
     }
@@ -45,28 +48,16 @@ impl MeasuredTurn {
         self.covariance.cholesky()?.l().try_inverse().filter(|inverse| inverse.iter().all(|value| value.is_finite()))
     }
 
-    /// The relative pose with this turn, its translation as it is at these poses.
-    fn observed(&self, poses: &[Isometry3<f64>]) -> Option<Isometry3<f64>> {
-        let model = poses.get(self.first)?.inverse() * poses.get(self.second)?;
-        Some(Isometry3::from_parts(model.translation, self.first_from_second))
-    }
-
-    /// As the rows of a pair of stations.
-    pub(crate) fn reduced(&self, poses: &[Isometry3<f64>]) -> Option<Reduced> {
-        let mut rows = DMatrix::zeros(3, 6);
-        rows.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.whitening()?);
-        Some(Reduced { rows, right: DVector::zeros(3), pose: self.observed(poses)? })
-    }
-
     /// Whitened residual and its derivatives by the tangents of both poses.
     pub(crate) fn linearised(&self, poses: &[Isometry3<f64>]) -> Option<(Vector3<f64>, [Matrix3x6<f64>; 2])> {
-        let values = [self.first, self.second].map(|station| poses.get(station).map(RigidPose::values));
-        let [Some(first), Some(second)] = values else { return None };
-        let (v, by_first, by_second) = relative_pose_parts(&self.observed(poses)?, &[&first, &second]).ok()?;
+        let (first, second) = (poses.get(self.first)?, poses.get(self.second)?);
+        // The translation is not observed.
+        let observed = Isometry3::from_parts((first.inverse() * second).translation, self.first_from_second);
+        let (v, by) = relative_pose_parts(&observed, first, second);
         let whitening = self.whitening()?;
         // The residual is observed minus model.
-        let rows = |by: nalgebra::Matrix6<f64>| -(whitening * by.fixed_rows::<3>(3));
-        Some((whitening * v.fixed_rows::<3>(3), [rows(by_first), rows(by_second)]))
+        let rows = |by: Matrix6<f64>| -(whitening * by.fixed_rows::<3>(3));
+        Some((whitening * v.fixed_rows::<3>(3), by.map(rows)))
     }
 }
 

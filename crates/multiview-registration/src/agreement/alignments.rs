@@ -37,11 +37,6 @@ pub(crate) struct Overlap {
     pub fraction: f64,
 }
 
-pub(crate) fn without_partners(pair: &PairAlignment) -> RefusedPair {
-    let reason = format!("only {:.0} % of the points have a partner", 100.0 * pair.result.overlap);
-    RefusedPair { target: pair.target, source: pair.source, reason }
-}
-
 /// Pairs of target and source that are among the best partners of either, in ascending order.
 pub(crate) fn best_partners(
     overlaps: &[Overlap],

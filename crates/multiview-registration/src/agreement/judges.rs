@@ -1,14 +1,12 @@
 //! Stations held against what is usual among the others.
 
 use crate::agreement::placement::{FEWEST_STATIONS, PairAgreement};
+use statistics::Distribution;
 
 /// Fewest sampled points seen in common by which a station is judged.
 const FEWEST_POINTS: usize = 100;
 /// Contradicting for each agreeing point that are usual even where the others have fewer: voxels beside edges.
 const USUAL: f64 = 0.02;
-
-/// What 80 % of normal deviations are below, in standard deviations.
-const NORMAL_AT_80: f64 = 0.8416;
 
 /// Agreeing and contradicting points.
 type Counts = (usize, usize);
@@ -57,7 +55,7 @@ impl Judges {
     pub(crate) fn scatter(&self) -> f64 {
         let at = |share: f64| self.odds.get((share * self.odds.len() as f64) as usize).map_or(0.0, |odds| odds.0);
         let usual = at(0.5).max(USUAL);
-        (at(0.8) - usual).max(0.0) / usual / NORMAL_AT_80
+        (at(0.8) - usual).max(0.0) / usual / Distribution::Normal.quantile(0.8)
     }
 
     /// Contradictions of a station over what the other sound ones have among themselves, in the median; `None` of fewer than five,

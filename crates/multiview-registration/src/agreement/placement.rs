@@ -9,13 +9,14 @@ use rayon::prelude::*;
 
 use crate::agreement::judges::Judges;
 use crate::agreement::sight::{Sight, may_judge};
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::relative_pose::check_poses;
 use crate::surfaces::patches::faces_origin;
 use global_registration::{
     CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, agreement_of_rooms, in_voxels,
 };
 use point_cloud::Cloud;
-use rigid_pose::is_finite;
+use rigid_pose::InputError;
 use statistics::Distribution;
 
 /// How often what is usual in the survey a station must be contradicted to be doubted.
@@ -26,8 +27,8 @@ pub(crate) const FEWEST_STATIONS: usize = 5;
 /// Probability at which any of many stations in their places is doubted, were their odds normal about their median. Measured upwards in
 /// buildings (80, 95, 99.7 %) they are, within a tenth.
 const LEVEL: f64 = 0.01;
-/// Stations beyond which they are taken to stand in several rooms.
-const ONE_ROOM: usize = 40;
+/// Stations beyond which they are taken to stand in several rooms: each sees some of the others.
+pub(crate) const ONE_ROOM: usize = 40;
 
 /// The verdict on the place of a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,13 +112,13 @@ impl Placements {
 /// the space they looked through.
 ///
 /// # Errors
-/// [`Error::Empty`], [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::NotPositive`] for the input.
+/// [`InputError::Empty`], [`InputError::LengthMismatch`], [`InputError::NonFinite`], [`InputError::NotPositive`] for the input.
 pub fn judge_placements(stations: &[Cloud], world_from_station: &[Isometry3<f64>]) -> Result<Placements> {
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
-    crate::relative_pose::require_poses(stations.len(), world_from_station)?;
-    if let Some(index) = world_from_station.iter().position(|pose| !is_finite(pose)) {
-        return Err(Error::NonFinite { what: "poses of the stations", index });
+    if stations.is_empty() {
+        return Err(InputError::Empty { what: "the list of stations" }.into());
     }
+    check_poses("poses of the stations", stations.len(), world_from_station)?;
     let clouds = prepared(stations);
     let sights: Vec<Option<Sight>> = clouds.iter().map(|cloud| cloud.as_ref().map(Sight::new)).collect();
     let placed = |station: usize| Some((clouds[station].as_ref()?, world_from_station[station]));

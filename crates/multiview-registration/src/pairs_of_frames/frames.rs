@@ -11,9 +11,10 @@ use crate::error::{Error, Result};
 use crate::pairs_of_frames::frame_graph::FrameGraph;
 use crate::pairs_of_frames::frame_pairs::{Candidate, FramePair, Frames, Guess};
 use crate::pairs_of_frames::frame_scale::scaled;
+use crate::relative_pose::check_poses;
 use crate::survey::registration::Start;
 use projective_registration::{Agreement, FrameAlignmentOptions, OrganisedFrame, SharedError};
-use rigid_pose::is_finite;
+use rigid_pose::InputError;
 
 /// Share of a frame that another must be expected to see for the two to be aligned.
 const LEAST_OVERLAP: f64 = 0.3;
@@ -89,7 +90,7 @@ pub struct FrameRegistration {
 /// or that contradict what the others see are not placed but named. `progress(done, total)` is told the rounds.
 ///
 /// # Errors
-/// [`Error::Empty`], [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::InvalidOption`] for the input;
+/// [`InputError::Empty`], [`InputError::LengthMismatch`], [`InputError::NonFinite`], [`InputError::InvalidOption`] for the input;
 /// [`Error::UnconnectedStations`] where no two frames belong together.
 pub fn register_frames(
     frames: &[OrganisedFrame],
@@ -98,13 +99,10 @@ pub fn register_frames(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<FrameRegistration> {
     if frames.is_empty() {
-        return Err(Error::Empty { what: "the list of frames" });
+        return Err(InputError::Empty { what: "the list of frames" }.into());
     }
     if let Start::Poses(poses) = start {
-        crate::relative_pose::require_poses(frames.len(), poses)?;
-        if let Some(index) = poses.iter().position(|pose| !is_finite(pose)) {
-            return Err(Error::NonFinite { what: "poses of the frames", index });
-        }
+        check_poses("poses of the frames", frames.len(), poses)?;
     }
     let mut survey = Survey::new(frames, start, options);
     let graph = survey.run(progress)?;

@@ -12,9 +12,11 @@ use rigid_pose::{eigen6, step_pose};
 
 use crate::adjustment::joint_covariance::JointCovariance;
 use crate::adjustment::joints::Joint;
+use crate::agreement::loops::reached;
 use crate::error::Result;
-use crate::places::search::{LOOSE, Places, move_by, pairs, root};
-use crate::places::sought::{AGAINST_IT, BEGUN, SIGMAS};
+use crate::places::search::{LOOSE, Places, move_by, pairs};
+use crate::places::sought::{AGAINST_IT, SIGMAS};
+use crate::planes::shared_planes::root;
 
 /// Deviation of a relative pose from which a joint is looked at, patches: in buildings neighbours are held to 1 to 7 thousandths of one, and
 /// what hangs on a single face that was met in the wrong place to 13 (80 mm off). Smaller values only take time.
@@ -94,7 +96,7 @@ impl Places<'_> {
 
     /// The pairs that hold all stations best, weakest first.
     fn tree(&self) -> Result<Vec<Weakest>> {
-        let joint = JointCovariance::new(self.adjusted.cofactors.clone(), self.adjusted.variance_factor());
+        let joint = JointCovariance::new(self.adjusted.cofactors.clone(), self.adjusted.factor);
         let all: Vec<[usize; 2]> = pairs(self.adjusted).collect();
         let mut all: Vec<Weakest> =
             all.par_iter().map(|ends| Weakest::new(self, &joint, *ends)).collect::<Result<_>>()?;
@@ -112,19 +114,9 @@ impl Places<'_> {
 
     /// Which stations lie on the other side of a pair of the tree than the one that is held.
     fn beyond(&self, tree: &[Weakest], joint: [usize; 2]) -> Vec<bool> {
-        let mut next = vec![Vec::new(); self.points.len()];
-        for [a, b] in tree.iter().map(|pair| pair.stations).filter(|pair| *pair != joint) {
-            next[a].push(b);
-            next[b].push(a);
-        }
-        let mut beyond = vec![true; self.points.len()];
-        let mut open = vec![self.network.fixed];
-        while let Some(station) = open.pop() {
-            if std::mem::take(&mut beyond[station]) {
-                open.extend(&next[station]);
-            }
-        }
-        beyond
+        let others = tree.iter().map(|pair| pair.stations).filter(|pair| *pair != joint);
+        let here = reached(&others.map(|[a, b]| (a, b)).collect::<Vec<_>>(), self.network.fixed);
+        (0..self.points.len()).map(|station| !here.contains(&station)).collect()
     }
 
     /// Slides what lies beyond a joint; returns whether it has moved.
@@ -189,7 +181,7 @@ impl Places<'_> {
         (back_m, known_m): (f64, f64),
     ) -> Option<Between> {
         let step_m = STEP * self.size_m;
-        let reach_m = (BEGUN * known_m).max(self.size_m);
+        let reach_m = (SIGMAS * known_m).max(self.size_m);
         let [low, high] =
             [back_m.min(0.0) - reach_m, back_m.max(0.0) + reach_m].map(|slide_m| (slide_m / step_m).round() as i32);
         let motions: Vec<Isometry3<f64>> =

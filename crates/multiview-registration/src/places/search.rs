@@ -10,23 +10,21 @@ use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
 use crate::adjustment::joints::Joint;
+use crate::adjustment::known::Known;
 use crate::adjustment::network::Network;
-use crate::adjustment::rounds::{FEWEST_CONTACTS, KNOWN, Known};
+use crate::adjustment::rounds::FEWEST_CONTACTS;
 use crate::adjustment::simultaneous::Adjusted;
 use crate::error::Result;
 use crate::places::sought::Sought;
-use crate::planes::sightings::{Gate, NOWHERE, Sighting, Wide, members};
+use crate::planes::sightings::{APART, Gate, NOWHERE, Sighting, Wide, members};
 use crate::planes::sums::Sums;
 use crate::surfaces::extents::Extent;
 use crate::surfaces::points::{Block, StationPoints};
-use icp_registration::RobustKernel;
 
 /// Points of a station that make a tile one that it saw.
 const FEWEST_POINTS: usize = 5;
 /// Of so many points that lie on planes one is held against the rays of others.
 const STRIDE: usize = 8;
-/// Standard deviations before a point up to which its ray is free.
-const BEFORE: f64 = 7.0;
 /// Deviation of a relative pose beyond which two stations do not hold each other, patches: shared planes are joined within as much.
 pub(crate) const LOOSE: f64 = 0.05;
 
@@ -57,12 +55,11 @@ impl<'a> Places<'a> {
     ) -> Self {
         let planes = &adjusted.shared_planes;
         let (wide, members) = (Wide::new(planes), members(points.len(), planes));
-        let [least, most] = [KNOWN * size_m, reach_m].map(|length_m| Known::at(length_m, network.hold_m));
-        let known_m = Known::estimated(start, &adjusted.state.poses, least, most).position_m;
-        let gate = Gate { kernel: RobustKernel::Tukey, slack_m: 0.0, stride: 1, parameters: 0 };
+        let known_m = Known::estimated(start, &adjusted.state.poses, (size_m, reach_m), network.hold_m).position_m;
+        let gate = Gate { slack_m: 0.0, stride: 1, parameters: 0 };
         let look = |station: usize| {
             let (points, pose) = (&points[station], &adjusted.state.poses[station]);
-            let free_to = |(point, sigma): (&Point3<f64>, &f64)| (*point, point.coords.norm() - BEFORE * sigma);
+            let free_to = |(point, sigma): (&Point3<f64>, &f64)| (*point, point.coords.norm() - APART * sigma);
             let space = FreeSpace::new(&points.points.iter().zip(&points.sigma).map(free_to).collect::<Vec<_>>());
             let tiles = Sighting::new(points, pose, planes, gate).sums_and_tiles(&wide, &members[station]).1;
             let on_planes = points.points.iter().zip(tiles).filter(|(_, tile)| *tile != NOWHERE);
@@ -131,14 +128,6 @@ impl<'a> Places<'a> {
 pub(crate) fn pairs(adjusted: &Adjusted) -> impl Iterator<Item = [usize; 2]> + '_ {
     let pairs = adjusted.common.pairs.iter().filter(|(_, tiles)| tiles.len() >= FEWEST_CONTACTS);
     pairs.map(|(&(a, b), _)| [a as usize, b as usize])
-}
-
-/// The first of the stations that one belongs to.
-pub(crate) fn root(part: &[usize], mut station: usize) -> usize {
-    while part[station] != station {
-        station = part[station];
-    }
-    station
 }
 
 pub(crate) fn move_by(motion: &Isometry3<f64>, pose: &mut Isometry3<f64>) {

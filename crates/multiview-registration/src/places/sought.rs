@@ -2,15 +2,14 @@
 
 use std::cmp::Reverse;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::error::Result;
 use crate::places::search::Places;
 use crate::planes::elimination::motion_of;
 use crate::planes::sightings::{Gate, NOWHERE, Sighting, Wide};
 use crate::surfaces::points::StationPoints;
-use icp_registration::RobustKernel;
-use rigid_pose::eigen6;
+use rigid_pose::{eigen6, product_jacobians};
 
 /// Steps of a slide, patches.
 const STEP: f64 = 0.25;
@@ -24,7 +23,8 @@ const STEPS: usize = 4;
 const OFF: f64 = 0.1;
 /// Standard deviations by which more points must lie on planes elsewhere, or fewer contradict: beyond chance, even if points come in
 /// groups of some five. Elsewhere stations of simulated buildings that are right come to 2.1, those 4 to 14 cm off from 19 to 42; with less,
-/// right ones are moved and doubted.
+/// right ones are moved and doubted. Those from where it began within which a station is sought, too: one in a million is farther off along
+/// some axis.
 pub(crate) const SIGMAS: f64 = 5.0;
 /// By which the other of the two may speak against it: as often as one time in forty by chance.
 pub(crate) const AGAINST_IT: f64 = 2.0;
@@ -32,8 +32,6 @@ pub(crate) const AGAINST_IT: f64 = 2.0;
 const FEWEST_AGAINST: usize = 20;
 /// How many points on planes each of them outweighs where several places are better: of each eighth point contradictions are counted.
 const AGAINST: f64 = 4.0;
-/// Standard deviations from where it began within which a station is sought: one in a million is farther off along some axis.
-pub(crate) const BEGUN: f64 = 5.0;
 
 /// A place of the station, with how many of its points lie on what the others saw.
 struct Place {
@@ -107,7 +105,7 @@ impl<'a> Sought<'a> {
         let of_others = |plane: usize| planes[plane].tiles.numbers().any(by_others);
         let wide = places.wide.within(&places.around(station, &pose), of_others);
         let mut points = places.points[station].clone();
-        let gate = Gate { kernel: RobustKernel::Tukey, slack_m: 0.0, stride: 1, parameters: 0 };
+        let gate = Gate { slack_m: 0.0, stride: 1, parameters: 0 };
         let sighting = Sighting::new(&points, &pose, planes, gate);
         let (_, tiles) = sighting.sums_and_tiles(&wide, &places.members[station]);
         for (sigma, tile) in points.sigma.iter_mut().zip(tiles) {
@@ -167,7 +165,7 @@ impl<'a> Sought<'a> {
     fn may_have_begun(&self, motion: &Isometry3<f64>) -> bool {
         let begun = &self.places.start[self.station];
         let off_m = ((motion * self.pose).translation.vector - begun.translation.vector).norm();
-        off_m <= BEGUN * self.places.known_m
+        off_m <= SIGMAS * self.places.known_m
     }
 
     /// The motion by shift and turn about where it is now.
@@ -189,7 +187,7 @@ impl<'a> Sought<'a> {
     /// The points of the station moved so, which may be off by some length.
     fn at(&self, motion: &Isometry3<f64>, slack_m: f64, stride: usize) -> Place {
         let planes = &self.places.adjusted.shared_planes;
-        let gate = Gate { kernel: RobustKernel::Tukey, slack_m, stride, parameters: 0 };
+        let gate = Gate { slack_m, stride, parameters: 0 };
         let pose = motion * self.pose;
         let sums =
             Sighting::new(&self.points, &pose, planes, gate).sums(&self.wide, &self.places.members[self.station]);
@@ -198,8 +196,8 @@ impl<'a> Sought<'a> {
             let Some(own) = sums.at(slot) else { continue };
             let plane = planes.partition_point(|plane| plane.tiles.first <= sums.tile(slot)) - 1;
             let motion = motion_of(&planes[plane], &pose);
-            normal += motion * Matrix3::from_fn(|i, j| own.product(i, j)) * motion.transpose();
-            right += motion * Vector3::from_fn(|i, _| own.right(i));
+            normal += motion * own.products(0, 0) * motion.transpose();
+            right += motion * own.rights(0);
             points += sums.count(slot);
         }
         let by = self.tangent(&pose);
@@ -208,10 +206,8 @@ impl<'a> Sought<'a> {
 
     /// How the tangent of a pose follows shift and turn about where the station is now.
     fn tangent(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
-        let (mut by, apart) = (Matrix6::identity(), self.pose.translation.vector - pose.translation.vector);
-        by.fixed_view_mut::<3, 3>(0, 3).copy_from(&apart.cross_matrix());
-        by.fixed_view_mut::<3, 3>(3, 3).copy_from(&pose.rotation.inverse().to_rotation_matrix().into_inner());
-        by
+        let apart = pose.translation.vector - self.pose.translation.vector;
+        product_jacobians(&Isometry3::identity(), &Isometry3::from_parts(apart.into(), pose.rotation)).0
     }
 
     /// The station moved onto the planes.

@@ -1,6 +1,7 @@
 //! Where the patches of two stations meet, and what each pair in contact observes.
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use rigid_pose::InputError;
 
 use crate::error::Result;
 use crate::surfaces::patches::Surface;
@@ -57,8 +58,8 @@ pub(crate) fn partners(
     let mut found = Vec::new();
     for (index, patch) in asking.patches.iter().enumerate() {
         let centre = rotation * patch.centre.coords + to_asked.translation.vector;
-        if !point_cloud::is_usable(&centre.into()) {
-            return Err(crate::Error::NonFinite { what: "points of a station in the frame of another", index });
+        if !rigid_pose::is_usable(&centre.into()) {
+            return Err(InputError::NonFinite { what: "points of a station in the frame of another", index }.into());
         }
         if !asked.extent.is_near(&centre, farthest_m) {
             continue;

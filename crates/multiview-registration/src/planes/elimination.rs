@@ -68,7 +68,7 @@ pub(crate) struct WideProducts {
     pub right: Vector3<f64>,
 }
 
-/// Normal equations of a shared plane: three unknowns a station that saw it, then the shared parameters.
+/// Normal equations of a shared plane: three unknowns a station that saw it, then the shared parameters, filled up to threes.
 #[derive(Debug, Clone)]
 pub(crate) struct Eliminated {
     pub stations: Vec<usize>,
@@ -126,83 +126,70 @@ impl<'a> SharedPlaneSums<'a> {
         if stations.len() < 2 {
             return None;
         }
-        let order = self.sums[0].order;
-        if order == 3 && stations.len() > most {
-            return Some(Eliminated::beside(stations, &seen, variances));
-        }
-        let of_motions = 3 * stations.len();
-        let size = of_motions + order - 3;
-        let (mut normal, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
-        let (mut mean, mut at) = (DVector::zeros(size), Vec::with_capacity(size));
-        for tile in seen.chunk_by(|a, b| a.tile == b.tile) {
-            mean.fill(0.0);
-            at.clear();
-            let (mut weight, mut distance) = (0.0, 0.0);
-            for Seen { of: k, sums, weight: own, .. } in tile {
-                // Errors in common leave a tile less weight than its points have.
-                let own = own / (1.0 + variances.shared * own * sums.weight());
-                let row = |i: usize| if i < 3 { 3 * k + i } else { of_motions + i - 3 };
-                for i in 0..order {
-                    for j in 0..order {
-                        normal[(row(i), row(j))] += own * sums.product(i, j);
-                    }
-                    right[row(i)] += own * sums.right(i);
-                    mean[row(i)] += own * sums.product(i, 0);
-                }
-                at.extend(3 * k..3 * k + 3);
-                weight += own * sums.weight();
-                distance += own * sums.right(0);
-            }
-            if variances.surface > 0.0 && weight > 0.0 {
-                at.extend(of_motions..size);
-                let share = 1.0 / (weight + 1.0 / variances.surface);
-                for &i in &at {
-                    for &j in &at {
-                        normal[(i, j)] -= share * mean[i] * mean[j];
-                    }
-                    right[i] -= share * mean[i] * distance;
-                }
-            }
-        }
-        Some(Eliminated::new(stations, normal, right))
+        Some(Tiled::new(&seen, stations.len(), self.sums[0].order, variances).eliminated(stations, most))
     }
 }
 
-impl Eliminated {
-    /// With the plane beside the stations: the same equations, none of them eliminated.
-    fn beside(stations: Vec<usize>, seen: &[Seen<'_>], variances: Variances) -> Self {
-        let count = stations.len();
-        let mut pairs: BTreeMap<(usize, usize), Matrix3<f64>> = BTreeMap::new();
-        let mut right = DVector::zeros(3 * count);
-        let mut means: Vec<(usize, Vector3<f64>)> = Vec::new();
+/// Products of the motions of stations over all tiles, with the offsets of these eliminated. The shared parameters, three by three,
+/// stand for further stations.
+struct Tiled {
+    /// Of those that saw the same tiles: the lower triangle.
+    pairs: BTreeMap<(usize, usize), Matrix3<f64>>,
+    right: DVector<f64>,
+}
+
+impl Tiled {
+    fn new(seen: &[Seen<'_>], count: usize, order: usize, variances: Variances) -> Self {
+        let threes = order.div_ceil(3);
+        let mut this = Self { pairs: BTreeMap::new(), right: DVector::zeros(3 * (count + threes - 1)) };
+        let mut means: BTreeMap<usize, Vector3<f64>> = BTreeMap::new();
         for tile in seen.chunk_by(|a, b| a.tile == b.tile) {
             means.clear();
             let (mut weight, mut distance) = (0.0, 0.0);
-            for Seen { of: k, sums, weight: own, .. } in tile {
+            for Seen { of, sums, weight: own, .. } in tile {
+                // Errors in common leave a tile less weight than its points have.
                 let own = own / (1.0 + variances.shared * own * sums.weight());
-                *pairs.entry((*k, *k)).or_default() += own * Matrix3::from_fn(|i, j| sums.product(i, j));
-                let mut part = right.fixed_rows_mut::<3>(3 * k);
-                part += own * Vector3::from_fn(|i, _| sums.right(i));
-                means.push((*k, own * Vector3::from_fn(|i, _| sums.product(i, 0))));
+                let place = |three: usize| if three == 0 { *of } else { count + three - 1 };
+                for a in 0..threes {
+                    for b in 0..=a {
+                        *this.pairs.entry((place(a), place(b))).or_default() += own * sums.products(a, b);
+                    }
+                    this.add_right(place(a), own, &sums.rights(a));
+                    *means.entry(place(a)).or_default() += own * sums.products(a, 0).column(0);
+                }
                 weight += own * sums.weight();
                 distance += own * sums.right(0);
             }
             if variances.surface > 0.0 && weight > 0.0 {
                 let share = 1.0 / (weight + 1.0 / variances.surface);
-                for (n, (a, first)) in means.iter().enumerate() {
-                    let mut part = right.fixed_rows_mut::<3>(3 * a);
-                    part -= share * distance * first;
-                    for (b, second) in &means[..=n] {
-                        *pairs.entry((*a, *b)).or_default() -= share * first * second.transpose();
+                for (&a, first) in &means {
+                    this.add_right(a, -share * distance, first);
+                    for (&b, second) in means.range(..=a) {
+                        *this.pairs.entry((a, b)).or_default() -= share * first * second.transpose();
                     }
                 }
             }
         }
-        let (mut from_motions, mut from_distances) = (DMatrix::zeros(3, 3 * count), Vector3::zeros());
+        this
+    }
+
+    fn add_right(&mut self, place: usize, factor: f64, values: &Vector3<f64>) {
+        let mut part = self.right.fixed_rows_mut::<3>(3 * place);
+        part += factor * values;
+    }
+
+    /// The plane eliminated, or beside more than `most` stations.
+    fn eliminated(self, stations: Vec<usize>, most: usize) -> Eliminated {
+        let Self { pairs, mut right } = self;
+        let (count, size) = (stations.len(), right.len());
+        // The plane moves as all stations together would, the other way.
+        let (mut from_motions, mut from_distances) = (DMatrix::zeros(3, size), Vector3::zeros());
         for (&(a, b), block) in &pairs {
-            let mut part = from_motions.fixed_view_mut::<3, 3>(0, 3 * b);
-            part += block;
-            if a != b {
+            if a < count {
+                let mut part = from_motions.fixed_view_mut::<3, 3>(0, 3 * b);
+                part += block;
+            }
+            if b < count && a != b {
                 let mut part = from_motions.fixed_view_mut::<3, 3>(0, 3 * a);
                 part += block.transpose();
             }
@@ -212,35 +199,28 @@ impl Eliminated {
             from_distances += right.fixed_rows::<3>(3 * k);
             of_plane += from_motions.fixed_view::<3, 3>(0, 3 * k);
         }
-        of_plane[(1, 1)] += SLOPE.powi(-2);
-        of_plane[(2, 2)] += SLOPE.powi(-2);
-        let inverse = of_plane.try_inverse().unwrap_or_else(Matrix3::zeros);
-        // The plane moves the other way.
-        let wide = WideProducts { pairs, with_plane: -&from_motions, of_plane, right: -from_distances };
-        Self { stations, products: Products::Beside(Box::new(wide)), right, inverse, from_motions, from_distances }
-    }
-
-    fn new(stations: Vec<usize>, mut normal: DMatrix<f64>, mut right: DVector<f64>) -> Self {
-        let count = stations.len();
-        // The plane moves as all stations together would, the other way.
-        let mut from_motions = DMatrix::zeros(3, normal.ncols());
-        let (mut of_plane, mut from_distances) = (Matrix3::zeros(), Vector3::zeros());
-        for k in 0..count {
-            from_motions += normal.rows(3 * k, 3);
-            from_distances += right.fixed_rows::<3>(3 * k);
-        }
-        for k in 0..count {
-            of_plane += from_motions.fixed_view::<3, 3>(0, 3 * k);
-        }
         // Points on a line leave a slope open.
         of_plane[(1, 1)] += SLOPE.powi(-2);
         of_plane[(2, 2)] += SLOPE.powi(-2);
         let inverse = of_plane.try_inverse().unwrap_or_else(Matrix3::zeros);
-        normal -= from_motions.transpose() * inverse * &from_motions;
-        right -= from_motions.transpose() * (inverse * from_distances);
-        Self { stations, products: Products::Eliminated(normal), right, inverse, from_motions, from_distances }
+        let products = if size == 3 * count && count > most {
+            let with_plane = -&from_motions;
+            Products::Beside(Box::new(WideProducts { pairs, with_plane, of_plane, right: -from_distances }))
+        } else {
+            let mut normal = DMatrix::zeros(size, size);
+            for (&(a, b), block) in &pairs {
+                normal.fixed_view_mut::<3, 3>(3 * b, 3 * a).copy_from(&block.transpose());
+                normal.fixed_view_mut::<3, 3>(3 * a, 3 * b).copy_from(block);
+            }
+            normal -= from_motions.transpose() * inverse * &from_motions;
+            right -= from_motions.transpose() * (inverse * from_distances);
+            Products::Eliminated(normal)
+        };
+        Eliminated { stations, products, right, inverse, from_motions, from_distances }
     }
+}
 
+impl Eliminated {
     /// Numbers the stations by their place in a list that holds them all.
     pub(crate) fn rename(&mut self, stations: &[usize]) {
         for station in &mut self.stations {

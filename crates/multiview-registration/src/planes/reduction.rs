@@ -6,12 +6,15 @@
 //! that thousands of single observations would give it, at the price of six a pair.
 
 use nalgebra::{DMatrix, DVector, Isometry3, SymmetricEigen};
+use rigid_pose::InputError;
 
-use crate::error::{Error, Result};
-use crate::planes::contacts::{Contact, imitated, observe};
+use crate::error::Result;
+use crate::planes::contacts::{Contact, Observed, imitated, observe};
 use crate::surfaces::patches::Surface;
 use icp_registration::RobustKernel;
 
+/// While stations are still apart, what is far off keeps some weight.
+const KERNEL: RobustKernel = RobustKernel::Huber;
 /// Information below this share of the largest is rounding.
 const ROUNDING: f64 = 1e-10;
 /// Share of a direction's information that noisy normals may have imitated; beyond, the direction is left open. What
@@ -35,31 +38,27 @@ pub(crate) struct Scene<'a> {
     pub parameters: usize,
 }
 
-/// How residuals are weighted.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Weighting {
-    pub kernel: RobustKernel,
-    /// Standard deviation of a whitened residual.
-    pub scale: f64,
-}
-
 /// A linearised contact: whitened residual, derivative by `x`, weight (kernel and share).
-pub(crate) struct Row {
-    pub residual: f64,
-    pub jacobian: DVector<f64>,
-    pub weight: f64,
+struct Row {
+    residual: f64,
+    jacobian: DVector<f64>,
+    weight: f64,
 }
 
 impl Scene<'_> {
-    pub(crate) fn row(
+    fn observed(&self, pair_contacts: &PairContacts, contact: &Contact, pose: &Isometry3<f64>) -> Observed {
+        observe(self.surfaces[pair_contacts.source], self.surfaces[pair_contacts.target], contact, pose)
+    }
+
+    /// `scale`: standard deviation of a whitened residual.
+    fn row(
         &self,
         pair_contacts: &PairContacts,
         contact: &Contact,
         pose: &Isometry3<f64>,
-        weighting: &Weighting,
-    ) -> (Row, crate::planes::contacts::Observed) {
-        let (source, target) = (self.surfaces[pair_contacts.source], self.surfaces[pair_contacts.target]);
-        let observed = observe(source, target, contact, pose);
+        scale: f64,
+    ) -> (Row, Observed) {
+        let observed = self.observed(pair_contacts, contact, pose);
         let sigma = observed.variance.sqrt();
         let mut jacobian = DVector::zeros(6 + self.parameters);
         jacobian.fixed_rows_mut::<6>(0).copy_from(&(observed.jacobian / sigma));
@@ -72,7 +71,7 @@ impl Scene<'_> {
             jacobian[6 + k] = observed.normal.dot(&moved) / sigma;
         }
         let residual = observed.residual / sigma;
-        let weight = contact.share * weighting.kernel.weight(residual / weighting.scale);
+        let weight = contact.share * KERNEL.weight(residual / scale);
         (Row { residual, jacobian, weight }, observed)
     }
 
@@ -82,8 +81,7 @@ impl Scene<'_> {
         contact: &Contact,
         pose: &Isometry3<f64>,
     ) -> f64 {
-        let (source, target) = (self.surfaces[pair_contacts.source], self.surfaces[pair_contacts.target]);
-        let observed = observe(source, target, contact, pose);
+        let observed = self.observed(pair_contacts, contact, pose);
         observed.residual / observed.variance.sqrt()
     }
 }
@@ -104,13 +102,13 @@ pub(crate) fn reduce(
     scene: &Scene<'_>,
     pair_contacts: &PairContacts,
     pose: &Isometry3<f64>,
-    weighting: &Weighting,
+    scale: f64,
 ) -> Result<Reduced> {
     let n = 6 + scene.parameters;
     let (mut information, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
     let mut imitation = DMatrix::zeros(n, n);
     for contact in &pair_contacts.contacts {
-        let (row, observed) = scene.row(pair_contacts, contact, pose, weighting);
+        let (row, observed) = scene.row(pair_contacts, contact, pose, scale);
         information.ger(row.weight, &row.jacobian, &row.jacobian, 1.0);
         gradient.axpy(row.weight * row.residual, &row.jacobian, 1.0);
         let noise = imitated(scene.surfaces[pair_contacts.source], contact, &observed, pose) / observed.variance;
@@ -139,9 +137,9 @@ fn observations(
     });
     let scaled = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |r, c| 0.5 * (m[(r, c)] + m[(c, r)]) * scale[r] * scale[c]);
     let (information, imitation) = (scaled(information), scaled(imitation));
-    let failed = |why| Error::Numerical { what: "the normal equations of a pair of stations", why };
+    let failed = |why| InputError::Numerical { what: "the normal equations of a pair of stations", why };
     if information.iter().chain(gradient.iter()).any(|v| !v.is_finite()) {
-        return Err(failed("they are not finite"));
+        return Err(failed("they are not finite").into());
     }
     let eigen = SymmetricEigen::try_new(information, 1e-15, 10_000).ok_or(failed("no eigenvalues were found"))?;
     let largest = eigen.eigenvalues.max();

@@ -5,8 +5,8 @@ use nalgebra::DVector;
 use statistics::mad_scale;
 
 use crate::planes::elimination::{Eliminated, SharedPlaneSums, Variances};
+use crate::planes::sightings::KERNEL;
 use crate::planes::sums::Sums;
-use icp_registration::RobustKernel;
 
 /// Widening of the kernel for means of tiles: what is on the surface keeps its weight.
 const WIDE: f64 = 2.0;
@@ -80,15 +80,15 @@ impl Scatter {
 }
 
 /// The scatter between stations in the same tiles.
-pub(crate) fn between(means: &[Vec<TileMean>], sums: &[Sums], kernel: RobustKernel) -> Scatter {
+pub(crate) fn between(means: &[Vec<TileMean>], sums: &[Sums]) -> Scatter {
     let deviations = means.iter().flatten().map(|mean| mean.deviation.abs()).filter(|deviation| *deviation > 0.0);
     let scale = mad_scale(&mut deviations.collect::<Vec<f64>>()).max(1.0);
-    let noise = noise_of_means(kernel);
+    let noise = noise_of_means();
     let weights = sums.iter().map(|sums| vec![1.0; sums.tiles()]).collect();
     let mut scatter = Scatter { weights, noise, ..Scatter::default() };
     let mut sensitivity = 0.0;
     for mean in means.iter().flatten() {
-        scatter.weights[mean.station][mean.slot as usize] = kernel.weight(mean.deviation / (WIDE * scale));
+        scatter.weights[mean.station][mean.slot as usize] = KERNEL.weight(mean.deviation / (WIDE * scale));
     }
     for own in
         means.iter().flat_map(|shared_plane| shared_plane.chunk_by(|a, b| a.tile == b.tile)).filter(|own| own.len() > 1)
@@ -107,12 +107,12 @@ pub(crate) fn between(means: &[Vec<TileMean>], sums: &[Sums], kernel: RobustKern
     scatter
 }
 
-/// Variance of a mean with the weights of a kernel times the sum of these weights, for normal noise: `E k²u² / E k`.
-fn noise_of_means(kernel: RobustKernel) -> f64 {
+/// Variance of a mean with the weights of the kernel times the sum of these weights, for normal noise: `E k²u² / E k`.
+fn noise_of_means() -> f64 {
     let (mut squares, mut weights) = (0.0, 0.0);
     for step in 0..100 {
         let u = 0.05 * f64::from(step);
-        let (density, weight) = ((-u * u / 2.0).exp(), kernel.weight(u));
+        let (density, weight) = ((-u * u / 2.0).exp(), KERNEL.weight(u));
         squares += density * (weight * u).powi(2);
         weights += density * weight * if step == 0 { 0.5 } else { 1.0 };
     }

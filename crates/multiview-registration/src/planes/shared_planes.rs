@@ -8,6 +8,7 @@ use crate::planes::contacts::Contact;
 use crate::planes::reduction::PairContacts;
 use crate::planes::tiles::Tiles;
 use crate::surfaces::extents::{Extent, Extents};
+use crate::surfaces::grouping::cell;
 use crate::surfaces::patches::{Surface, axes};
 use crate::surfaces::plane_fit::{Moments, SAME_DIRECTION};
 use crate::surfaces::regions::{OFF_PLANE, ROUGHER};
@@ -111,11 +112,8 @@ impl<'a> Joined<'a> {
         Self { surfaces, poses, centre, tolerance_m, first, parent, moments, normals }
     }
 
-    fn root(&self, mut node: usize) -> usize {
-        while self.parent[node] != node {
-            node = self.parent[node];
-        }
-        node
+    fn root(&self, node: usize) -> usize {
+        root(&self.parent, node)
     }
 
     fn node(&self, station: usize, patch: u32) -> Option<usize> {
@@ -296,6 +294,14 @@ impl<'a> Joined<'a> {
     }
 }
 
+/// The root of the tree that a node of a forest belongs to.
+pub(crate) fn root(parent: &[usize], mut node: usize) -> usize {
+    while parent[node] != node {
+        node = parent[node];
+    }
+    node
+}
+
 /// The patches of one piece of a plane, cell by cell.
 struct Piece {
     centres: Vec<Point3<f64>>,
@@ -327,10 +333,6 @@ impl Piece {
             column.any(|(_, other)| (centre - self.centres[*other as usize]).norm() <= self.reach_m)
         })
     }
-}
-
-fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
-    <[f64; 3]>::from(point.coords).map(|x| (x / size_m).floor() as i64)
 }
 
 /// Both ends of all contacts, as stations and patches.

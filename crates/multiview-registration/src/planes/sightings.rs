@@ -14,10 +14,12 @@ use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::points::{Block, StationPoints};
 use icp_registration::{RobustKernel, TUKEY};
 
+/// For single points and for what a station saw of a tile: what is no common surface has no weight.
+pub(crate) const KERNEL: RobustKernel = RobustKernel::Tukey;
 /// Smallest cosine between ray and normal.
 const GRAZING: f64 = 0.03;
-/// Standard deviations between the ranges of two shared planes below which they are not told apart.
-const APART: f64 = 7.0;
+/// Standard deviations between ranges below which they are not told apart: those of two shared planes, or of a point and what is before it.
+pub(crate) const APART: f64 = 7.0;
 
 /// The tile of a point that lies on none.
 pub(crate) const NOWHERE: u32 = u32::MAX;
@@ -25,7 +27,6 @@ pub(crate) const NOWHERE: u32 = u32::MAX;
 /// How points are given to shared planes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gate {
-    pub kernel: RobustKernel,
     /// Standard deviation that the poses add across the surfaces, metre.
     pub slack_m: f64,
     /// Of so many points one is taken.
@@ -146,7 +147,7 @@ impl<'a> Sighting<'a> {
             self.add_member(self.points.slot_of[point as usize] as usize, shared_plane as usize);
         }
         self.sums.close();
-        self.sums.free_derivatives_of_noise(self.gate.kernel);
+        self.sums.free_derivatives_of_noise();
         (self.sums, self.tiles)
     }
 
@@ -265,7 +266,7 @@ impl<'a> Sighting<'a> {
         if whitened.is_nan() || whitened.abs() > TUKEY || !sigma.is_normal() {
             return;
         }
-        let weight = self.gate.kernel.weight(whitened) / sigma.powi(2);
+        let weight = KERNEL.weight(whitened) / sigma.powi(2);
         self.phi[1..3].copy_from_slice(&hit.place);
         let parameters = self.gate.parameters;
         if parameters > 0 {

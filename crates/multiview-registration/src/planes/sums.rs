@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use icp_registration::{RobustKernel, TUKEY};
+use crate::planes::sightings::KERNEL;
+use icp_registration::TUKEY;
 
 /// Fewest degrees of freedom that tell how much noise derivatives share with distances.
 const FEWEST_FREE: f64 = 5.0;
@@ -62,11 +63,11 @@ impl Sums {
     /// left so, the noise of all points would shrink the scene. Within a tile derivatives are linear in `[u, v]`; the sums
     /// become those of the lines fitted to them, less what the noise leaves in the fit, which the scatter about the lines
     /// tells.
-    pub(crate) fn free_derivatives_of_noise(&mut self, kernel: RobustKernel) {
+    pub(crate) fn free_derivatives_of_noise(&mut self) {
         if self.order == 3 {
             return;
         }
-        let (stride, share) = (Self::stride(self.order), share_of_fit(kernel));
+        let (stride, share) = (Self::stride(self.order), share_of_fit());
         for own in self.values.chunks_exact_mut(stride) {
             if !freed_of_noise(own, self.order, share) {
                 own.fill(0.0);
@@ -109,19 +110,19 @@ impl Sums {
         let stride = Self::stride(self.order);
         let begin = self.begins.get(slot)?.1 as usize;
         let own = self.values.get(begin..begin + stride)?;
-        let (products, right) = own.split_at(stride - self.order - 1);
+        let (products, right) = own[..stride - 1].split_at(stride - self.order - 1);
         (own[0] > 0.0).then_some(TileSums { products, right })
     }
 }
 
 /// What a fitted number keeps of the noise, over what a degree of freedom leaves of it: `E[w² x²] / (E[w] E[w x²])` of
-/// normal deviations x, one without a robust kernel.
-fn share_of_fit(kernel: RobustKernel) -> f64 {
+/// normal deviations x; it would be one without a robust kernel.
+fn share_of_fit() -> f64 {
     let (mut all, mut weights, mut left, mut kept) = (0.0, 0.0, 0.0, 0.0);
     for step in -500..=500 {
         let x = f64::from(step) / 100.0;
         let density = (-0.5 * x * x).exp();
-        let weight = if x.abs() > TUKEY { 0.0 } else { kernel.weight(x) };
+        let weight = if x.abs() > TUKEY { 0.0 } else { KERNEL.weight(x) };
         all += density;
         weights += density * weight;
         left += density * weight * x * x;
@@ -191,6 +192,20 @@ impl TileSums<'_> {
 
     pub(crate) fn right(&self, row: usize) -> f64 {
         self.right[row]
+    }
+
+    /// Products of three by three; zero beyond the last.
+    pub(crate) fn products(&self, a: usize, b: usize) -> Matrix3<f64> {
+        let known = |row: usize| row < self.right.len();
+        Matrix3::from_fn(|i, j| {
+            let (row, column) = (3 * a + i, 3 * b + j);
+            if known(row) && known(column) { self.product(row, column) } else { 0.0 }
+        })
+    }
+
+    /// Three right sides; zero beyond the last.
+    pub(crate) fn rights(&self, a: usize) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| self.right.get(3 * a + i).copied().unwrap_or(0.0))
     }
 
     /// Sum of the weights.

@@ -1,6 +1,6 @@
 //! Points into groups: those of one cell of space whose normals agree and which lie on one plane.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use point_cloud::Cloud;
 
@@ -32,10 +32,15 @@ pub(crate) fn group(cloud: &Cloud, normals: &[Vector3<f64>], size_m: f64) -> Vec
 
 /// The usable points with the cells of space that they lie in, cell by cell, ascending.
 pub(crate) fn by_cells(cloud: &Cloud, usable: impl Fn(usize) -> bool, size_m: f64) -> Vec<([i64; 3], u32)> {
-    let cell = |i: usize| <[i64; 3]>::from(cloud.points[i].coords.map(|c| (c / size_m).floor() as i64));
-    let mut keyed: Vec<_> = (0..cloud.len()).filter(|&i| usable(i)).map(|i| (cell(i), i as u32)).collect();
+    let keyed = (0..cloud.len()).filter(|&i| usable(i)).map(|i| (cell(&cloud.points[i], size_m), i as u32));
+    let mut keyed: Vec<_> = keyed.collect();
     keyed.sort_unstable();
     keyed
+}
+
+/// The cell of space that a point lies in.
+pub(crate) fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
+    <[f64; 3]>::from(point.coords).map(|x| (x / size_m).floor() as i64)
 }
 
 fn groups_of_cell(cloud: &Cloud, normals: &[Vector3<f64>], run: &[([i64; 3], u32)], size_m: f64) -> Vec<Group> {
@@ -64,21 +69,14 @@ pub(crate) fn patch_size(cloud: &Cloud) -> f64 {
     let n = cloud.len() as f64;
     let centre = cloud.points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords / n);
     let square: f64 = cloud.points.iter().map(|p| (p.coords - centre).norm_squared() / n).sum();
-    let cell = square.sqrt() / 12.0;
-    if cell <= 0.0 {
+    let cell_m = square.sqrt() / 12.0;
+    if cell_m <= 0.0 {
         return 1.0;
     }
-    let mut cells: Vec<[i64; 3]> = cloud
-        .points
-        .iter()
-        .map(|p| {
-            let c = p.coords.map(|c| (c / cell).floor());
-            [c.x as i64, c.y as i64, c.z as i64]
-        })
-        .collect();
+    let mut cells: Vec<[i64; 3]> = cloud.points.iter().map(|point| cell(point, cell_m)).collect();
     cells.sort_unstable();
     cells.dedup();
     // A plane meets about one and a half cells per area of a cell's face.
-    let area = cells.len() as f64 / 1.5 * cell * cell;
+    let area = cells.len() as f64 / 1.5 * cell_m * cell_m;
     (POINTS_PER_PATCH * area / n).sqrt()
 }

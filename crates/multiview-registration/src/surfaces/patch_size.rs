@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::surfaces::grouping::{group, patch_size};
+use crate::surfaces::patches::FEWEST_POINTS;
 use crate::surfaces::plane_fit::Moments;
 use point_cloud::Cloud;
 use point_cloud::eigenvalues3;
@@ -16,8 +17,6 @@ const ENOUGH: f64 = 0.9;
 /// Factor between sizes that are tried, and how many.
 const STEP: f64 = std::f64::consts::SQRT_2;
 const MOST_STEPS: usize = 12;
-/// Fewest points whose scatter about a plane says something.
-const FEWEST: usize = 6;
 
 /// Size of the patches of a cloud, metre: about 25 points each, and more where noise asks for it.
 ///
@@ -46,12 +45,9 @@ pub(crate) fn size(cloud: &Cloud, normals: &[Vector3<f64>]) -> f64 {
 /// Standard deviation across patches of a size that nearly all points do not exceed, metre.
 fn scatter(cloud: &Cloud, normals: &[Vector3<f64>], size_m: f64) -> f64 {
     let mut found: Vec<(f64, usize)> = Vec::new();
-    for points in group(cloud, normals, size_m).iter().filter(|points| points.len() >= FEWEST) {
+    for points in group(cloud, normals, size_m).iter().filter(|points| points.len() >= FEWEST_POINTS) {
         let origin = cloud.points[points[0] as usize].coords;
-        let mut moments = Moments::default();
-        for &i in points {
-            moments.add(&(cloud.points[i as usize].coords - origin));
-        }
+        let moments = Moments::of(&cloud.points, points, &origin);
         let count = moments.count();
         let variance = eigenvalues3(&moments.scatter())[0].max(0.0) * count / (count - 3.0);
         found.push((variance.sqrt(), points.len()));

@@ -7,9 +7,10 @@
 //! happens to resemble that of its partner.
 
 use nalgebra::{Point3, Vector3};
+use rigid_pose::InputError;
 use statistics::upper_median;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::surfaces::extents::Extent;
 use crate::surfaces::grouping::group;
 use crate::surfaces::plane_fit::{Moments, Plane, SAME_DIRECTION};
@@ -17,8 +18,8 @@ use crate::surfaces::regions::{Patches, Region};
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
 
-/// Fewest points of a patch.
-const FEWEST_POINTS: usize = 6;
+/// Fewest points of a patch: those whose scatter about a plane says something.
+pub(crate) const FEWEST_POINTS: usize = 6;
 /// Neighbouring patches that may belong to the same plane: those around one in a grid, and some more.
 const NEIGHBOURS: usize = 13;
 /// Reach of the neighbourhood, in patches.
@@ -83,10 +84,7 @@ impl Groups {
     fn fitted(&self, points: &[Point3<f64>], origin: &Vector3<f64>) -> (Self, Vec<(Moments, Plane)>) {
         let mut fits = Vec::with_capacity(self.starts.len());
         let kept = self.filtered(|_, own| {
-            let mut moments = Moments::default();
-            for &i in own {
-                moments.add(&(points[i as usize].coords - origin));
-            }
+            let moments = Moments::of(points, own, origin);
             let plane = moments.plane();
             fits.extend(plane.map(|plane| (moments, plane)));
             plane.is_some()
@@ -148,7 +146,9 @@ impl Surface {
 
     fn from_fits(groups: Groups, fits: &[(Moments, Plane)], origin: &Vector3<f64>, size_m: f64) -> Result<Self> {
         if fits.is_empty() {
-            return Err(Error::TooFewPoints { what: "surfaces of a station", found: 0, needed: FEWEST_POINTS });
+            return Err(
+                InputError::TooFewPoints { what: "surfaces of a station", found: 0, needed: FEWEST_POINTS }.into()
+            );
         }
         let centres = centres(fits, origin);
         let tree = NeighbourTree::new(&centres)?;
@@ -225,10 +225,7 @@ fn of_one_plane(cloud: &Cloud, normals: &[Vector3<f64>], mut points: Vec<u32>, r
     for _ in 0..2 {
         let Some(&first) = points.first() else { return points };
         let origin = cloud.points[first as usize].coords;
-        let mut moments = Moments::default();
-        for &i in &points {
-            moments.add(&(cloud.points[i as usize].coords - origin));
-        }
+        let moments = Moments::of(&cloud.points, &points, &origin);
         let Some(plane) = moments.plane() else { return points };
         let mean = moments.mean();
         let distance = |i: u32| plane.normal.dot(&(cloud.points[i as usize].coords - origin - mean)).abs();

@@ -1,6 +1,6 @@
 //! Planes through groups of points from their moments, with the scatter that is left.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use point_cloud::{eigenvalues3, eigenvector3};
 
@@ -28,10 +28,16 @@ pub(crate) struct Plane {
 }
 
 impl Moments {
-    pub fn add(&mut self, point: &Vector3<f64>) {
-        self.count += 1.0;
-        self.sum += point;
-        self.products += point * point.transpose();
+    /// Of some points about an origin.
+    pub(crate) fn of(points: &[Point3<f64>], indices: &[u32], origin: &Vector3<f64>) -> Self {
+        let mut moments = Self::default();
+        for &index in indices {
+            let point = points[index as usize].coords - origin;
+            moments.count += 1.0;
+            moments.sum += point;
+            moments.products += point * point.transpose();
+        }
+        moments
     }
 
     pub(crate) fn join(&mut self, other: &Self) {

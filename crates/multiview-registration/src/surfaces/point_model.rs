@@ -1,8 +1,9 @@
 //! Points that depend on parameters which all stations share.
 
 use nalgebra::Point3;
+use rigid_pose::{InputError, require_length};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// Points that depend on parameters which all stations share, such as the terms of a range error: what the sensor is
 /// stays outside this crate.
@@ -55,20 +56,23 @@ impl SharedParameters {
     }
 }
 
+/// Values and standard deviations of the shared parameters beforehand.
+pub(crate) type Prior = (Vec<f64>, Vec<f64>);
+
 /// Refuses a model whose lists differ in length or are not numbers, and returns the prior.
-pub(crate) fn checked_prior(model: &dyn PointModel) -> Result<(Vec<f64>, Vec<f64>)> {
+pub(crate) fn checked_prior(model: &dyn PointModel) -> Result<Prior> {
     let (values, sigma) = model.prior();
     let expected = model.names().len();
     for found in [values.len(), sigma.len()] {
-        if found != expected {
-            return Err(Error::LengthMismatch { what: "prior of the point model", expected, found });
-        }
+        require_length("prior of the point model", expected, found)?;
     }
     if let Some(index) = values.iter().position(|v| !v.is_finite()) {
-        return Err(Error::NonFinite { what: "prior of the point model", index });
+        return Err(InputError::NonFinite { what: "prior of the point model", index }.into());
     }
     if let Some(index) = sigma.iter().position(|s| s.is_nan() || *s <= 0.0) {
-        return Err(Error::NotPositive { what: "prior sigma of the point model", index, value: sigma[index] });
+        return Err(
+            InputError::NotPositive { what: "prior sigma of the point model", index, value: sigma[index] }.into()
+        );
     }
     Ok((values, sigma))
 }

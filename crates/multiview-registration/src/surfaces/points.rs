@@ -5,14 +5,15 @@
 //! for that would mislead: the rays tell which surface they saw, and what mixes two is far from both.
 
 use nalgebra::{Point3, Vector3};
+use rigid_pose::InputError;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::surfaces::grouping::by_cells;
 use crate::surfaces::noise::NoiseLaw;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::PointModel;
 use point_cloud::Cloud;
-use point_cloud::check_points;
+use rigid_pose::require_points;
 
 /// Size of a block, patches.
 const BLOCK: f64 = 2.0;
@@ -102,9 +103,9 @@ impl StationPoints {
             let derivatives = &mut self.derivatives[slot * m..(slot + 1) * m];
             cloud[index as usize] = model.point(station, index as usize, parameters, Some(derivatives));
         }
-        check_points("points of the point model", &cloud)?;
+        require_points("points of the point model", &cloud)?;
         if let Some(index) = self.derivatives.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
-            return Err(Error::NonFinite { what: "derivatives of the point model", index });
+            return Err(InputError::NonFinite { what: "derivatives of the point model", index }.into());
         }
         self.place(&cloud);
         Ok(())

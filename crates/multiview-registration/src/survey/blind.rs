@@ -22,9 +22,8 @@ const HYPOTHESES: usize = 16;
 const ARRANGEMENTS: usize = 12;
 /// Of the sampled points, one in this many ranks the arrangements.
 const STRIDE: usize = 4;
-/// Steps of a station onto those placed before it, and sweeps over all at the end.
+/// Steps of a station onto those placed before it, and of all onto each other at the end.
 const STEPS: usize = 4;
-const SWEEPS: usize = 4;
 /// Passes over all stations in which each may go where it fits better among all others, and poses refined for each.
 const REPLACEMENTS: usize = 3;
 const REPLACED_FROM: usize = 6;
@@ -267,7 +266,7 @@ impl Search<'_> {
 
     /// One station after the other onto all others, so that what has added up along the way is shared out.
     fn swept(&self, poses: &mut [Isometry3<f64>], held: usize) {
-        for _ in 0..SWEEPS {
+        for _ in 0..STEPS {
             for station in (0..poses.len()).filter(|&station| station != held) {
                 let all: Vec<Option<Isometry3<f64>>> = poses.iter().copied().map(Some).collect();
                 poses[station] = self.refined(&all, station, &poses[station], 1);

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::adjustment::joint_covariance::JointCovariance;
-use rigid_pose::pose_difference;
+use rigid_pose::{pose_difference, product_jacobians};
 
 /// What fixes the common frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,7 @@ impl Datum {
             turned.fixed_view_mut::<3, 3>(6 * k, 6 * k).copy_from(&turn);
         }
         let change = turned * change;
-        (centred, JointCovariance::of_whole(&change * cofactors * change.transpose(), poses.len()))
+        (centred, JointCovariance::of_whole(&change * cofactors * change.transpose()))
     }
 }
 
@@ -65,11 +65,7 @@ fn weight(component: usize, lever_m: f64) -> f64 {
 
 /// How the tangent `[dt world, dtheta station]` of a pose changes when the world moves by `[shift, turn]`.
 fn motion(pose: &Isometry3<f64>) -> Matrix6<f64> {
-    let mut motion = Matrix6::identity();
-    motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&-pose.translation.vector.cross_matrix());
-    let inverse = pose.rotation.inverse().to_rotation_matrix().into_inner();
-    motion.fixed_view_mut::<3, 3>(3, 3).copy_from(&inverse);
-    motion
+    product_jacobians(&Isometry3::identity(), pose).0
 }
 
 /// Moves all poses together so that they are on average those at the start.

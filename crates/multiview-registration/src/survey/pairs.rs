@@ -4,7 +4,7 @@ use nalgebra::{DVector, Isometry3, Matrix6};
 use rayon::prelude::*;
 
 use crate::adjustment::equations::Equations;
-use crate::adjustment::network::{Network, State};
+use crate::adjustment::known::Known;
 use crate::adjustment::precision;
 use crate::adjustment::simultaneous::Adjusted;
 use crate::agreement::alignments::{Overlap, PairAlignment};
@@ -64,9 +64,7 @@ impl Adjusted {
 
     fn pair(&self, target: usize, source: usize, hold_m: f64, size_m: f64) -> Result<PairAlignment> {
         let poses = [self.state.poses[target], self.state.poses[source]];
-        let none = (Vec::new(), Vec::new());
-        let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none, turns: &[], whole: true };
-        let mut equations = Equations::new(2, 0);
+        let mut equations = Equations::new(2, Some(0), 0, 0);
         let also = &self.common.planes[source];
         for &plane in self.common.planes[target].iter().filter(|plane| also.binary_search(plane).is_ok()) {
             let (shared_plane, variances) = (&self.shared_planes[plane as usize], self.variances[plane as usize]);
@@ -76,16 +74,15 @@ impl Adjusted {
                 equations.add(shared_plane, &eliminated, &poses);
             }
         }
-        let state = State { poses: poses.to_vec(), parameters: Vec::new() };
         // Along a weak direction the pair stays where all stations have it: there the tiles would be others.
-        let (step, _) = equations.solved(&network.near(size_m / 2.0), &state)?;
-        let (_, cofactors) = equations.solved(&network, &state)?;
+        let step = equations.step(&equations.cofactors(Known::at(size_m / 2.0, hold_m))?);
+        let cofactors = equations.cofactors(Known::at(hold_m, hold_m))?;
         let moved = step_pose(&poses[1], &step.fixed_rows::<6>(6).into_owned());
         let result = self.result(target, source, poses[0].inverse() * moved, size_m);
         let to_target = poses[0].rotation.inverse().to_rotation_matrix().into_inner();
         let mut turn = Matrix6::identity();
         turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_target);
-        let covariance = symmetrised(&(turn * cofactors.of(1) * turn.transpose())) * self.variance_factor();
+        let covariance = symmetrised(&(turn * cofactors.of(1) * turn.transpose())) * self.factor;
         let degenerate = precision::undetermined(&result.target_from_source, &covariance, hold_m, size_m);
         Ok(PairAlignment { target, source, result: IcpResult { covariance, degenerate, ..result } })
     }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::planes::contacts::BESIDE;
 use crate::survey::registration::{StationRegistration, SurfacePair};
-use point_cloud::check_points;
+use rigid_pose::require_points;
 
 /// Part of a patch that a point may be off it across.
 const ACROSS: f64 = 0.5;
@@ -19,13 +19,13 @@ impl StationRegistration {
     /// `points`: in the station's frame, metre, such as the station's own (for a map, in the order of its pixels).
     ///
     /// # Errors
-    /// [`Error::NoSuchStation`], [`Error::NonFinite`].
+    /// [`Error::NoSuchStation`], [`InputError::NonFinite`](rigid_pose::InputError::NonFinite).
     pub fn point_residuals(&self, station: usize, points: &[Point3<f64>]) -> Result<Vec<f64>> {
         let count = self.world_from_station.len();
         if station >= count {
             return Err(Error::NoSuchStation { station, count });
         }
-        check_points("points of a station", points)?;
+        require_points("points of a station", points)?;
         let other = |pair: &SurfacePair| match (pair.target == station, pair.source == station) {
             (true, _) => Some(pair.source),
             (_, true) => Some(pair.target),

@@ -13,6 +13,7 @@ use crate::agreement::alignments::Overlap;
 use crate::agreement::loops::reached;
 use crate::agreement::placement::{Placements, judge_placements};
 use crate::error::{Error, Result};
+use crate::relative_pose::check_poses;
 use crate::surfaces::point_model::SharedParameters;
 use crate::surfaces::points::StationPoints;
 use crate::survey::check::{Checked, checked};
@@ -22,7 +23,7 @@ use crate::survey::registration::{
 };
 use crate::survey::together::{Brought, brought_together, is_whole, network, prior_of};
 use point_cloud::Cloud;
-use rigid_pose::is_finite;
+use rigid_pose::{InputError, require_option, require_positive};
 
 /// Most stations at once from approximate poses. In buildings of so many (see docs/benchmarks.md) all come into their places, or are
 /// named; of more that has not been shown.
@@ -40,9 +41,9 @@ const MOST_ARRANGED: usize = 200;
 /// Clouds without normals get them from their nearest neighbours.
 ///
 /// # Errors
-/// [`Error::UnconnectedStations`] names stations that no pair leads to; [`Error::TooManyStations`]; [`Error::Empty`], [`Error::LengthMismatch`],
-/// [`Error::NonFinite`], [`Error::NotPositive`], [`Error::NoSuchStation`], [`Error::InvalidOption`] for the input;
-/// [`Error::Adjustment`] where shared parameters are not determined.
+/// [`Error::UnconnectedStations`] names stations that no pair leads to; [`Error::TooManyStations`]; [`InputError::Empty`],
+/// [`InputError::LengthMismatch`], [`InputError::NonFinite`], [`InputError::NotPositive`], [`Error::NoSuchStation`],
+/// [`InputError::InvalidOption`] for the input; [`InputError::Numerical`] where shared parameters are not determined.
 pub fn register_stations(
     stations: &[Cloud],
     start: Start<'_>,
@@ -92,14 +93,11 @@ fn validate(
     options: &StationRegistrationOptions<'_>,
 ) -> Result<()> {
     if stations.is_empty() {
-        return Err(Error::Empty { what: "the list of stations" });
+        return Err(InputError::Empty { what: "the list of stations" }.into());
     }
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
     if let Start::Poses(poses) = start {
-        crate::relative_pose::require_poses(stations.len(), poses)?;
-        if let Some(index) = poses.iter().position(|pose| !is_finite(pose)) {
-            return Err(Error::NonFinite { what: "poses of the stations", index });
-        }
+        check_poses("poses of the stations", stations.len(), poses)?;
     }
     require_few(stations.len(), start, options)?;
     let (station, count) = (datum.held_station(), stations.len());
@@ -107,18 +105,9 @@ fn validate(
         return Err(Error::NoSuchStation { station, count });
     }
     options.turns.iter().try_for_each(|turn| turn.check(count))?;
-    let lengths = [("start_error_m", options.start_error_m), ("patch_m", options.patch_m)];
-    for (name, value) in lengths {
-        if let Some(value) = value
-            && !(value > 0.0 && value < 1e100)
-        {
-            return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
-        }
-    }
-    if !(options.minimum_overlap >= 0.0 && options.minimum_overlap <= 1.0) {
-        return Err(Error::InvalidOption { name: "minimum_overlap", value: options.minimum_overlap, domain: "0 to 1" });
-    }
-    Ok(())
+    require_positive("start_error_m", options.start_error_m)?;
+    require_positive("patch_m", options.patch_m)?;
+    Ok(require_option("minimum_overlap", options.minimum_overlap, "0 to 1", |share| (0.0..=1.0).contains(&share))?)
 }
 
 /// Refuses what would come out wrong somewhere, or take hours. Shared parameters couple all stations: then they are adjusted as few are.
@@ -155,7 +144,7 @@ fn result(
     let count = adjusted.state.poses.len();
     let parameters = adjusted.state.parameters.len();
     let (redundancy, sigma0) = (adjusted.redundancy(), adjusted.sigma0());
-    let joint = JointCovariance::new(adjusted.cofactors.clone(), adjusted.variance_factor());
+    let joint = JointCovariance::new(adjusted.cofactors.clone(), adjusted.factor);
     let undetermined = undetermined(&adjusted.state.poses, &joint, network.hold_m, size_m);
     let surfaces = adjusted.overlaps(FEWEST_CONTACTS).iter().map(|overlap| surface_pair(&adjusted, overlap)).collect();
     let (poses, joint) = datum.apply(start, adjusted.state.poses, joint, network.hold_m);

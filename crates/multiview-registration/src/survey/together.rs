@@ -6,17 +6,17 @@ use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 use statistics::upper_median;
 
+use crate::adjustment::known::Known;
 use crate::adjustment::network::{Network, State};
 use crate::adjustment::precision;
 use crate::adjustment::rounds::{Surfaces, WideRounds};
 use crate::adjustment::simultaneous::{Adjusted, Finish, MOST_ROUNDS};
-use crate::adjustment::sparse_equations::DENSE_STATIONS;
-use crate::agreement::placement::{Placements, judge_placements};
+use crate::agreement::placement::{ONE_ROOM, Placements, judge_placements};
 use crate::error::Result;
 use crate::places::search::Places;
 use crate::surfaces::patch_size;
 use crate::surfaces::patches::Surface;
-use crate::surfaces::point_model::checked_prior;
+use crate::surfaces::point_model::{Prior, checked_prior};
 use crate::surfaces::points::StationPoints;
 use crate::survey::datum::Datum;
 use crate::survey::registration::{Start, StationRegistrationOptions};
@@ -32,13 +32,11 @@ const START_ERROR: f64 = 0.2;
 /// The rounds end when no station moves by more than a patch over this: some hundredths of a millimetre.
 const TOLERANCE: f64 = 2000.0;
 
-/// Values and standard deviations of the shared parameters beforehand, and their names.
-pub(crate) type Prior = ((Vec<f64>, Vec<f64>), Vec<String>);
-
-pub(crate) fn prior_of(options: &StationRegistrationOptions<'_>) -> Result<Prior> {
+/// What is known of the shared parameters beforehand, and their names.
+pub(crate) fn prior_of(options: &StationRegistrationOptions<'_>) -> Result<(Prior, Vec<String>)> {
     match options.model {
         Some(model) => Ok((checked_prior(model)?, model.names())),
-        None => Ok(Prior::default()),
+        None => Ok(<(Prior, Vec<String>)>::default()),
     }
 }
 
@@ -46,17 +44,17 @@ pub(crate) fn network<'a>(
     datum: Datum,
     radius_m: f64,
     options: &StationRegistrationOptions<'a>,
-    (prior, names): (&'a (Vec<f64>, Vec<f64>), &'a [String]),
+    (prior, names): (&'a Prior, &'a [String]),
     whole: bool,
 ) -> Network<'a> {
     let fixed = datum.held_station();
-    Network { fixed, hold_m: radius_m, turn_rad: 1.0, names, prior, turns: options.turns, whole }
+    Network { fixed, hold_m: radius_m, names, prior, turns: options.turns, whole }
 }
 
-/// Whether the normal matrix is factorised as a whole. Shared parameters couple all stations, and stations that were arranged by what
+/// Whether stations are adjusted as few are: all held against each other. Shared parameters couple them, and stations that were arranged by what
 /// they saw are not off each by itself.
 pub(crate) fn is_whole(stations: usize, start: Start<'_>, options: &StationRegistrationOptions<'_>) -> bool {
-    options.model.is_some() || stations <= DENSE_STATIONS || !matches!(start, Start::Poses(_))
+    options.model.is_some() || stations <= ONE_ROOM || !matches!(start, Start::Poses(_))
 }
 
 /// All stations adjusted, before anything is judged.
@@ -99,7 +97,7 @@ pub(crate) fn brought_together(
     let moved = if whole { Isometry3::identity() } else { framed(&mut near, network.fixed, &start[network.fixed]) };
     let mut finish = Finish {
         network: &network,
-        near: network.near(patch_m / 2.0),
+        near: Known::at(patch_m / 2.0, radius_m),
         tolerance_m: patch_m / TOLERANCE,
         most_rounds: if whole { MOST_ROUNDS } else { FEW_ROUNDS },
         progress: &total,

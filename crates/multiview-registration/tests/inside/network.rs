@@ -1,4 +1,4 @@
-//! One step of many stations against that of few.
+//! Stations that are held by one of them against those that only anchors hold.
 
 #![allow(clippy::unwrap_used)]
 
@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::*;
 
 #[test]
-fn many_stations_come_where_few_do() {
+fn stations_without_a_held_one_come_where_those_with_one_do() {
     let number = |k: usize| ((k * 7919 + 13) as f64 * 0.618_034).sin();
     let vector = |k: usize| Vector3::new(number(k), number(k + 1), number(k + 2));
     let poses: Vec<Isometry3<f64>> = (0..6).map(|k| Isometry3::new(3.0 * vector(5 * k), vector(7 * k + 3))).collect();
@@ -33,10 +33,13 @@ fn many_stations_come_where_few_do() {
         covariance: nalgebra::Matrix3::identity() * 1e-6,
     };
     let (prior, turns) = ((Vec::new(), Vec::new()), [turn]);
-    let network =
-        Network { fixed: 2, hold_m: 3.0, turn_rad: 1.0, names: &[], prior: &prior, turns: &turns, whole: true };
+    let network = Network { fixed: 2, hold_m: 3.0, names: &[], prior: &prior, turns: &turns, whole: true };
     let state = State { poses: poses.clone(), parameters: Vec::new() };
-    let few = network.solve(&state, &pairs).unwrap();
+    let held = Anchors { fixed: Some(2), poses: &poses, known: network.held(), factor: 1.0 };
+    let solved = |anchors: &Anchors<'_>, steps: usize| {
+        (0..steps).fold(state.clone(), |state, _| network.solve(&state, &pairs, anchors).unwrap())
+    };
+    let few = solved(&held, 4);
     assert!(largest_step(&state, &few, 3.0) > 0.02);
     let off = |many: &State| {
         // Nothing but the anchors holds the frame.
@@ -44,11 +47,7 @@ fn many_stations_come_where_few_do() {
         let poses = many.poses.iter().map(|pose| moved * pose).collect();
         largest_step(&few, &State { poses, parameters: Vec::new() }, 3.0)
     };
-    let anchors = Anchors { poses: &poses, factor: 1.0 };
-    let many = network.solve_sparse(&state, &pairs, &anchors).unwrap();
-    // Two steps of centimetres and degrees against as many as it takes: the next would be of third order.
-    assert!(off(&many) < 1e-4, "{}", off(&many));
-    // Few stations end at a step of a thousandth of a standard deviation (1e-4 m); rounding is far below.
-    let again = network.solve_sparse(&many, &pairs, &anchors).unwrap();
-    assert!(off(&again) < 1e-6, "{}", off(&again));
+    let anchors = Anchors { fixed: None, ..held };
+    // A millionth of the radius.
+    assert!(off(&solved(&held, 1)) < 3e-6 && off(&solved(&anchors, 1)) < 3e-6);
 }

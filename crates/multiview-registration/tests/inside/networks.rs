@@ -7,12 +7,11 @@ use std::sync::OnceLock;
 use rigid_pose::pose_difference;
 
 use super::*;
+use crate::adjustment::equations::Equations;
 use crate::adjustment::joint_covariance::JointCovariance;
-use crate::adjustment::network::relative_jacobians;
-use crate::adjustment::sparse_equations::SparseEquations;
 use crate::places::joints::Weakest;
 use plan::{Building, Camera};
-use rigid_pose::step_pose;
+use rigid_pose::{relative_jacobians, step_pose};
 
 #[path = "../../examples/building/plan.rs"]
 mod plan;
@@ -55,7 +54,7 @@ fn sparse() -> &'static (Survey, Brought) {
 }
 
 fn joint(brought: &Brought) -> JointCovariance {
-    JointCovariance::new(brought.adjusted.cofactors.clone(), brought.adjusted.variance_factor())
+    JointCovariance::new(brought.adjusted.cofactors.clone(), brought.adjusted.factor)
 }
 
 #[test]
@@ -133,10 +132,10 @@ fn what_lies_beyond_a_joint_comes_where_no_rays_go_through_it() {
     let known = joints.clone();
     assert!(!places.slid(&weakest, &beyond, &mut poses, &mut joints) && joints == known);
     // It holds the two as surfaces do not.
-    let mut equations = SparseEquations::new(STATIONS, 8, 0);
+    let mut equations = Equations::new(STATIONS, Some(8), 0, 0);
     joint.add_to(&mut equations, right);
-    let cofactors = equations.cofactors(&network).unwrap();
-    let by_second = relative_jacobians(&right[8], &right[9])[1];
+    let cofactors = equations.cofactors(network.held()).unwrap();
+    let by_second = relative_jacobians(&right[8], &(right[8].inverse() * right[9]))[1];
     let of_joint = along.dot(&(by_second * cofactors.of(9) * by_second.transpose() * along));
     assert!((of_joint.sqrt() / joint.sigma_m - 1.0).abs() < 1e-3, "{of_joint} {joints:?}");
     let step = equations.step(&cofactors);

@@ -83,8 +83,7 @@ impl Surface {
         let degeneracy = DegeneracyPolicy::Report;
         let pixels = self.frame.as_ref().zip(source.frame.as_ref());
         let by_pixels = pixels.and_then(|(target, source)| {
-            let options = FrameAlignmentOptions { degeneracy, ..FrameAlignmentOptions::default() };
-            let result = align_frames(source, target, &guess, &options).ok()?;
+            let result = align_frames(source, target, &guess, &FrameAlignmentOptions::default()).ok()?;
             let moved = (result.target_from_source.translation.vector - guess.translation.vector).norm();
             error_m.is_none_or(|error_m| moved <= REACH * error_m).then_some(result)
         });

@@ -2,9 +2,10 @@
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use rigid_pose::{require_length, require_option};
 
 use super::{Neighbourhood, facing, no_normal};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// How the neighbourhood of a pixel is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +39,7 @@ impl Default for OrganisedNormalOptions {
 /// remains, or where its points form a line or a blob.
 ///
 /// # Errors
-/// [`Error::LengthMismatch`] where the points do not fill the frame, [`Error::InvalidOption`].
+/// [`InputError::LengthMismatch`] where the points do not fill the frame, [`InputError::InvalidOption`].
 pub fn organised_normals(
     points: &[[f64; 3]],
     width: usize,
@@ -46,26 +47,15 @@ pub fn organised_normals(
     options: &OrganisedNormalOptions,
 ) -> Result<Vec<Vector3<f64>>> {
     let expected = width.saturating_mul(height);
-    if points.len() != expected {
-        return Err(Error::LengthMismatch { what: "points of the frame", expected, found: points.len() });
+    require_length("points of the frame", expected, points.len())?;
+    require_option("max_relative_jump", options.max_relative_jump, "positive", |jump| jump > 0.0)?;
+    let half_width = options.half_width_px as f64;
+    require_option("half_width_px", half_width, "1 to 100", |width| (1.0..=100.0).contains(&width))?;
+    if let Some(widest) = options.widest_half_width_px {
+        let domain = "half_width_px to 100";
+        require_option("widest_half_width_px", widest as f64, domain, |width| (half_width..=100.0).contains(&width))?;
     }
-    if options.max_relative_jump.is_nan() || options.max_relative_jump <= 0.0 {
-        let value = options.max_relative_jump;
-        return Err(Error::InvalidOption { name: "max_relative_jump", value, domain: "positive" });
-    }
-    if !(1..=100).contains(&options.half_width_px) {
-        let value = options.half_width_px as f64;
-        return Err(Error::InvalidOption { name: "half_width_px", value, domain: "1 to 100" });
-    }
-    if let Some(widest) = options.widest_half_width_px
-        && !(options.half_width_px..=100).contains(&widest)
-    {
-        let (name, domain) = ("widest_half_width_px", "half_width_px to 100");
-        return Err(Error::InvalidOption { name, value: widest as f64, domain });
-    }
-    if !(options.min_fill >= 0.0 && options.min_fill <= 1.0) {
-        return Err(Error::InvalidOption { name: "min_fill", value: options.min_fill, domain: "0 to 1" });
-    }
+    require_option("min_fill", options.min_fill, "0 to 1", |fill| (0.0..=1.0).contains(&fill))?;
     let ranges: Vec<f64> = points.iter().map(|p| Vector3::from(*p).norm()).collect();
     let frame = Frame { points, ranges: &ranges, width, height, options };
     let mut normals = vec![no_normal(); expected];

@@ -2,9 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
+use rigid_pose::require_count;
 
 use super::{Neighbourhood, facing, no_normal};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::neighbours::NeighbourTree;
 
 /// How many neighbours a normal is taken from, and which side it points to.
@@ -27,7 +28,7 @@ impl Default for UnorganisedNormalOptions {
 /// Unit normals of a cloud; NaN in all components where the neighbours form a line or a blob.
 ///
 /// # Errors
-/// [`Error::Empty`], [`Error::NonFinite`], [`Error::InvalidOption`] for fewer than 3 neighbours.
+/// [`InputError::Empty`], [`InputError::NonFinite`], [`InputError::InvalidOption`] for fewer than 3 neighbours.
 pub fn unorganised_normals(points: &[Point3<f64>], options: &UnorganisedNormalOptions) -> Result<Vec<Vector3<f64>>> {
     let tree = NeighbourTree::new(points)?;
     normals_with_tree(points, &tree, options)
@@ -42,10 +43,7 @@ pub fn normals_with_tree(
     tree: &NeighbourTree,
     options: &UnorganisedNormalOptions,
 ) -> Result<Vec<Vector3<f64>>> {
-    if options.neighbours < 3 {
-        let value = options.neighbours as f64;
-        return Err(Error::InvalidOption { name: "neighbours", value, domain: "3 or more" });
-    }
+    require_count("neighbours", options.neighbours, 3)?;
     points
         .par_iter()
         .with_min_len(256)

@@ -7,12 +7,12 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::SAME_SURFACE_COSINE;
 
-use crate::partners::pairs::{Locate, Moved, WithLocate, with_locate};
+use crate::partners::pairs::{Locate, Moved, SinglePose, WithLocate, node_at, with_locate};
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::BLOCK;
 
 /// Distances from a plane within this multiple of their standard deviation agree with it.
-const AGREEING_SIGMA: f32 = 4.0;
+pub(crate) const AGREEING_SIGMA: f32 = 4.0;
 /// What maps and poses are wrong by beside the noise: this share of the depth.
 const AGREEING_SHARE: f32 = 0.005;
 /// Largest systematic error, share of the depth: 6 cm at 2 m, several times that of a Kinect. With 0.02 and 0.05 its paths are
@@ -202,8 +202,8 @@ pub(crate) struct Partner {
     /// Distance behind the plane, seen from the target camera, metre.
     pub(crate) residual: f32,
     cosine: f32,
-    target_variance: f32,
-    source_variance: f32,
+    /// Of the residual, m².
+    pub(crate) variance: f32,
 }
 
 impl Partner {
@@ -214,16 +214,12 @@ impl Partner {
 
     /// Whether it may be the same surface, measured with a systematic error.
     pub(crate) fn may_be_the_same(&self) -> bool {
-        self.residual.abs() <= AGREEING_SIGMA * self.variance().sqrt() - LARGEST_ERROR * self.point[2]
+        self.residual.abs() <= AGREEING_SIGMA * self.variance.sqrt() - LARGEST_ERROR * self.point[2]
             && self.cosine >= SAME_SURFACE_COSINE as f32
     }
 
-    pub(crate) fn variance(&self) -> f32 {
-        self.target_variance + self.source_variance
-    }
-
     fn tolerance(&self) -> f32 {
-        AGREEING_SIGMA * self.variance().sqrt() - AGREEING_SHARE * self.point[2]
+        AGREEING_SIGMA * self.variance.sqrt() - AGREEING_SHARE * self.point[2]
     }
 }
 
@@ -236,24 +232,11 @@ struct Learning<'a, 'b> {
 impl WithLocate for Learning<'_, '_> {
     type Output = ();
 
-    fn run<L: Locate>(self, locate: L) {
-        pulp::Arch::new().dispatch(LocatedLearning { all: self, locate });
-    }
-}
-
-struct LocatedLearning<'a, 'b, L> {
-    all: Learning<'a, 'b>,
-    locate: L,
-}
-
-impl<L: Locate> pulp::WithSimd for LocatedLearning<'_, '_, L> {
-    type Output = ();
-
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Learning { moved, learned } = self.all;
+    fn run<L: Locate>(self, locate: L) {
+        let Self { moved, learned } = self;
         for block in &moved.source.points.blocks {
-            let d = moved.distances(self.locate, block);
+            let d = moved.distances(locate, block);
             let mut fits = [false; BLOCK];
             for k in 0..BLOCK {
                 // NaN fails.
@@ -282,50 +265,34 @@ impl<F: FnMut(Option<Partner>)> WithLocate for Partners<'_, F> {
     type Output = ();
 
     fn run<L: Locate>(mut self, locate: L) {
-        let matrix = self.pose.rotation.to_rotation_matrix();
-        let r = [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)] as f32));
-        let t = [0, 1, 2].map(|i| self.pose.translation.vector[i] as f32);
-        let turn = |v: [f32; 3]| [0, 1, 2].map(|i| r[i][0] * v[0] + r[i][1] * v[1] + r[i][2] * v[2]);
+        let pose = SinglePose::new(self.pose);
         let (cols, rows) = (self.source.grid.cols, self.source.grid.rows);
         for row in (self.stride / 2..rows).step_by(self.stride) {
             for col in (self.stride / 2..cols).step_by(self.stride) {
                 let k = row * cols + col;
                 if let Some((point, normal)) = self.source.node(k) {
-                    let p = turn(point);
-                    let p = [0, 1, 2].map(|i| p[i] + t[i]);
-                    let partner = partner(self.target, locate, p, turn(normal), self.source.sigma[k]);
-                    (self.each)(partner.map(|partner| Partner { source: k as u32, ..partner }));
+                    let (point, normal) = (pose.moved(point), pose.turned(normal));
+                    let partner = self.partner(locate, k, point, normal);
+                    (self.each)(partner);
                 }
             }
         }
     }
 }
 
-/// The plane that a point in the target's frame falls on.
-fn partner<L: Locate>(
-    target: &OrganisedFrame,
-    locate: L,
-    p: [f32; 3],
-    normal: [f32; 3],
-    sigma: f32,
-) -> Option<Partner> {
-    let grid = &target.grid;
-    let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]);
-    let (col, row) = (col + 0.5, row + 0.5);
-    // NaN fails.
-    if !(p[2] < 0.0 && col >= 0.0 && row >= 0.0 && col < grid.cols as f32 && row < grid.rows as f32) {
-        return None;
+impl<F> Partners<'_, F> {
+    /// The plane on which a node of the source falls, its point and normal being in the target's frame.
+    fn partner<L: Locate>(&self, locate: L, k: usize, point: [f32; 3], normal: [f32; 3]) -> Option<Partner> {
+        let node = node_at(&self.target.grid, locate, point)?;
+        let plane = self.target.planes[node];
+        let dot = |v: &[f32; 3]| plane[0] * v[0] + plane[1] * v[1] + plane[2] * v[2];
+        plane[3].is_finite().then(|| Partner {
+            source: k as u32,
+            node: node as u32,
+            point,
+            residual: dot(&point) - plane[3],
+            cosine: dot(&normal),
+            variance: self.target.sigma[node].powi(2) + self.source.sigma[k].powi(2),
+        })
     }
-    let node = row as usize * grid.cols + col as usize;
-    let plane = target.planes[node];
-    let dot = |v: &[f32; 3]| plane[0] * v[0] + plane[1] * v[1] + plane[2] * v[2];
-    plane[3].is_finite().then(|| Partner {
-        source: 0,
-        node: node as u32,
-        point: p,
-        residual: dot(&p) - plane[3],
-        cosine: dot(&normal),
-        target_variance: target.sigma[node].powi(2),
-        source_variance: sigma * sigma,
-    })
 }

@@ -11,13 +11,15 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
-use crate::preparation::grid::BLOCK;
+use crate::preparation::grid::{BLOCK, Grid};
 use crate::preparation::projection::Lens;
 use crate::preparation::table::Table;
 
-/// Above the number of nodes of any frame, and the bits of single precision that hold what is below it.
+/// Above the number of nodes of any frame: from there on single precision holds whole numbers, in its low bits.
 const TWO_TO_23: f32 = 8_388_608.0;
-const LOW_BITS: u32 = (1 << 23) - 1;
+
+/// Smallest cosine between the normals of a pair (45 degrees): directions of planes through few noisy nodes scatter by some twenty each.
+const LEAST_COSINE: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
 /// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
 pub(crate) trait Locate: Copy + Sync {
@@ -54,10 +56,29 @@ impl Locate for Tabled<'_> {
     }
 }
 
-/// Something to be done with whatever camera the target has.
+/// Something to be done with whatever camera the target has, compiled for wide registers where it is inlined.
 pub(crate) trait WithLocate {
     type Output;
     fn run<L: Locate>(self, locate: L) -> Self::Output;
+}
+
+/// Does work with a camera, in wide registers.
+pub(crate) fn run_wide<W: WithLocate, L: Locate>(work: W, locate: L) -> W::Output {
+    pulp::Arch::new().dispatch(Wide { work, locate })
+}
+
+struct Wide<W, L> {
+    work: W,
+    locate: L,
+}
+
+impl<W: WithLocate, L: Locate> pulp::WithSimd for Wide<W, L> {
+    type Output = W::Output;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> W::Output {
+        self.work.run(self.locate)
+    }
 }
 
 /// Calls `work` with the camera of a frame.
@@ -66,31 +87,67 @@ pub(crate) fn with_locate<W: WithLocate>(frame: &OrganisedFrame, work: W) -> W::
     // Pixel p lies at node (p - (bin - 1) / 2) / bin.
     let shift = -(bin - 1.0) / 2.0;
     match frame.projection().lens() {
-        Lens::Pinhole { focal_px, centre_px } => work.run(Pinhole {
-            focal: focal_px.map(|f| (f / bin) as f32),
-            centre: centre_px.map(|c| ((c + shift) / bin) as f32),
-        }),
-        Lens::Table(table) => work.run(Tabled { table, scale: (1.0 / bin) as f32, shift: (shift / bin) as f32 }),
+        Lens::Pinhole { focal_px, centre_px } => {
+            let focal = focal_px.map(|f| (f / bin) as f32);
+            run_wide(work, Pinhole { focal, centre: centre_px.map(|c| ((c + shift) / bin) as f32) })
+        }
+        Lens::Table(table) => run_wide(work, Tabled { table, scale: (1.0 / bin) as f32, shift: (shift / bin) as f32 }),
     }
 }
 
 /// What decides on pairs and their weights.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Rules {
     /// Added to the variance of every pair, for what is not yet aligned, m².
     pub extra_variance: f32,
     /// Residuals beyond this multiple of their standard deviation have no weight (biweight).
     pub reach: f32,
-    /// Smallest cosine between the normals of a pair.
-    pub least_cosine: f32,
+}
+
+/// A pose in single precision.
+#[derive(Clone, Copy)]
+pub(crate) struct SinglePose {
+    rotation: [[f32; 3]; 3],
+    translation: [f32; 3],
+}
+
+impl SinglePose {
+    pub(crate) fn new(pose: &Isometry3<f64>) -> Self {
+        let matrix = pose.rotation.to_rotation_matrix();
+        Self {
+            rotation: [0, 1, 2].map(|r| [0, 1, 2].map(|c| matrix[(r, c)] as f32)),
+            translation: [0, 1, 2].map(|i| pose.translation.vector[i] as f32),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn turned(&self, v: [f32; 3]) -> [f32; 3] {
+        self.rotation.map(|r| r[0] * v[0] + r[1] * v[1] + r[2] * v[2])
+    }
+
+    #[inline]
+    pub(crate) fn moved(&self, point: [f32; 3]) -> [f32; 3] {
+        let turned = self.turned(point);
+        [0, 1, 2].map(|i| turned[i] + self.translation[i])
+    }
+}
+
+/// The node on which a point in the frame of the camera falls.
+#[inline]
+pub(crate) fn node_at<L: Locate>(grid: &Grid, locate: L, p: [f32; 3]) -> Option<usize> {
+    let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]);
+    let (col, row) = (col + 0.5, row + 0.5);
+    // NaN fails.
+    let inside = p[2] < 0.0 && col >= 0.0 && row >= 0.0 && col < grid.cols as f32 && row < grid.rows as f32;
+    inside.then(|| row as usize * grid.cols + col as usize)
 }
 
 /// The source frame on its way to the target.
 pub(crate) struct Moved<'a> {
     pub source: &'a OrganisedFrame,
     pub target: &'a OrganisedFrame,
-    rotation: [[f32; 3]; 3],
-    translation: [f32; 3],
+    rules: Rules,
+    pose: SinglePose,
     centre: [f32; 3],
     per_radius: f32,
 }
@@ -136,22 +193,26 @@ impl<'a> Moved<'a> {
         centre: &Vector3<f64>,
         radius_m: f64,
     ) -> Self {
-        let matrix = pose.rotation.to_rotation_matrix();
         Self {
             source,
             target,
-            rotation: [0, 1, 2].map(|r| [0, 1, 2].map(|c| matrix[(r, c)] as f32)),
-            translation: [0, 1, 2].map(|i| pose.translation.vector[i] as f32),
+            rules: Rules::default(),
+            pose: SinglePose::new(pose),
             centre: [0, 1, 2].map(|i| centre[i] as f32),
             per_radius: (1.0 / radius_m) as f32,
         }
     }
 
+    /// The same with pairs decided on by these.
+    pub(crate) fn by(self, rules: Rules) -> Self {
+        Self { rules, ..self }
+    }
+
     /// The pairs of a block of source nodes.
     #[inline(always)]
-    pub(crate) fn pairs<L: Locate>(&self, locate: L, rules: &Rules, block: &Block) -> Pairs {
+    pub(crate) fn pairs<L: Locate>(&self, locate: L, block: &Block) -> Pairs {
         let (p, source_normal, planes, distances) = self.compared(locate, block);
-        let (centre, per_radius, least_cosine) = (self.centre, self.per_radius, rules.least_cosine);
+        let (centre, per_radius, rules) = (self.centre, self.per_radius, self.rules);
         let (extra_variance, per_square_reach) = (rules.extra_variance, 1.0 / (rules.reach * rules.reach));
         let nothing = [0.0; BLOCK];
         let (mut accepted, mut met) = ([false; BLOCK], [false; BLOCK]);
@@ -161,7 +222,7 @@ impl<'a> Moved<'a> {
             let information = 1.0 / variance[k];
             let u2 = distances.residual[k] * distances.residual[k] * information * per_square_reach;
             // NaN fails: no partner.
-            accepted[k] = (distances.cosine[k] >= least_cosine) & (u2 < 1.0);
+            accepted[k] = (distances.cosine[k] >= LEAST_COSINE) & (u2 < 1.0);
             met[k] = u2 >= 0.0;
             let rest = 1.0 - u2;
             let (by_weight, by_slope) = (rest * rest * information, rest * (1.0 - 5.0 * u2) * information);
@@ -194,7 +255,7 @@ impl<'a> Moved<'a> {
         locate: L,
         block: &Block,
     ) -> ([[f32; BLOCK]; 3], [[f32; BLOCK]; 3], [[f32; BLOCK]; 4], Distances) {
-        let p = self.rotated(&block.position, self.translation);
+        let p = self.rotated(&block.position, self.pose.translation);
         let source_normal = self.rotated(&block.normal, [0.0; 3]);
         let (node, planes, variances, outside) = self.partners(locate, &p);
         let nothing = [0.0; BLOCK];
@@ -212,7 +273,7 @@ impl<'a> Moved<'a> {
     fn rotated(&self, vectors: &[[f32; BLOCK]; 3], shift: [f32; 3]) -> [[f32; BLOCK]; 3] {
         let mut moved = [[0.0; BLOCK]; 3];
         for i in 0..3 {
-            let r = self.rotation[i];
+            let r = self.pose.rotation[i];
             for k in 0..BLOCK {
                 moved[i][k] = r[0] * vectors[0][k] + r[1] * vectors[1][k] + r[2] * vectors[2][k] + shift[i];
             }
@@ -245,7 +306,7 @@ impl<'a> Moved<'a> {
             let col = if col < most_col { col } else { most_col };
             let row = if row < most_row { row } else { most_row };
             // Whole numbers below 2²³ as the low bits of their sum with it: a cast would be done lane by lane.
-            node[k] = (row.floor() * cols + col.floor() + TWO_TO_23).to_bits() & LOW_BITS;
+            node[k] = (row.floor() * cols + col.floor() + TWO_TO_23).to_bits() ^ TWO_TO_23.to_bits();
         }
         let (mut nodes, mut variances) = ([[f32::NAN; 4]; BLOCK], [f32::NAN; BLOCK]);
         for k in 0..BLOCK {

@@ -8,17 +8,15 @@ use rayon::prelude::*;
 
 use rigid_pose::MotionEquations;
 
-use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
+use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_locate};
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::BLOCK;
 
 /// Blocks of a chunk: sums in single precision stay short.
-const CHUNK: usize = 32;
+pub(crate) const CHUNK: usize = 32;
 /// Chunks that one thread takes at least.
 const CHUNKS_PER_TASK: usize = 4;
-/// Blocks of a sample that one thread takes at least.
-const SAMPLED_PER_TASK: usize = 64;
 /// 21 products of the derivatives, 6 with the residual, and the sums of weight, weighted squares and pairs.
 pub(crate) const SUMS: usize = 30;
 
@@ -34,14 +32,9 @@ pub(crate) struct Normal {
 }
 
 /// Sums over blocks of the source.
-pub(crate) fn normal_equations(
-    moved: &Moved<'_>,
-    rules: &Rules,
-    blocks: &[Block],
-    chunks: &mut Vec<[f64; SUMS]>,
-) -> Normal {
+pub(crate) fn normal_equations(moved: &Moved<'_>, blocks: &[Block], chunks: &mut Vec<[f64; SUMS]>) -> Normal {
     chunks.resize(blocks.len().div_ceil(CHUNK), [0.0; SUMS]);
-    with_locate(moved.target, AllChunks { moved, rules, blocks, chunks });
+    with_locate(moved.target, AllChunks { moved, blocks, chunks });
     let mut total = [0.0; SUMS];
     for chunk in chunks.iter() {
         for (t, c) in total.iter_mut().zip(chunk) {
@@ -61,7 +54,6 @@ impl Normal {
 
 struct AllChunks<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     chunks: &'a mut [[f64; SUMS]],
 }
@@ -70,9 +62,9 @@ impl WithLocate for AllChunks<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        let (moved, rules) = (self.moved, self.rules);
+        let moved = self.moved;
         let work = |(sums, blocks): (&mut [f64; SUMS], &[Block])| {
-            pulp::Arch::new().dispatch(Chunk { moved, rules, locate, blocks, sums });
+            run_wide(Chunk { moved, blocks, sums }, locate);
         };
         if self.chunks.len() < 2 * CHUNKS_PER_TASK {
             self.chunks.iter_mut().zip(self.blocks.chunks(CHUNK)).for_each(work);
@@ -83,22 +75,20 @@ impl WithLocate for AllChunks<'_, '_> {
     }
 }
 
-struct Chunk<'a, 'b, L> {
+struct Chunk<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
-    locate: L,
     blocks: &'a [Block],
     sums: &'a mut [f64; SUMS],
 }
 
-impl<L: Locate> pulp::WithSimd for Chunk<'_, '_, L> {
+impl WithLocate for Chunk<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn run<L: Locate>(self, locate: L) {
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];
         for block in self.blocks {
-            let pairs = self.moved.pairs(self.locate, self.rules, block);
+            let pairs = self.moved.pairs(locate, block);
             add(&mut lanes, &pairs, &derivatives(&pairs.lever, &pairs.normal));
         }
         *self.sums = [0.0; SUMS];
@@ -169,18 +159,12 @@ pub(crate) fn derivatives(lever: &[[f32; BLOCK]; 3], normal: &[[f32; BLOCK]; 3])
 
 /// Median of the absolute residuals, over their standard deviations, of about `most` nodes of the blocks; `None` where there
 /// are no pairs.
-pub(crate) fn median_residual(
-    moved: &Moved<'_>,
-    rules: &Rules,
-    blocks: &[Block],
-    most: usize,
-    scratch: &mut Vec<u32>,
-) -> Option<f64> {
+pub(crate) fn median_residual(moved: &Moved<'_>, blocks: &[Block], most: usize, scratch: &mut Vec<u32>) -> Option<f64> {
     // Spread evenly over the blocks.
     let step = (blocks.len() * BLOCK).div_ceil(most.max(1)).max(1);
     scratch.clear();
     scratch.resize(blocks.len().div_ceil(step) * BLOCK, NO_PAIR);
-    with_locate(moved.target, Sample { moved, rules, blocks, step, squares: scratch });
+    with_locate(moved.target, Sample { moved, blocks, step, squares: scratch });
     scratch.retain(|square| *square != NO_PAIR);
     median_of_bits(scratch).map(|square| f64::from(square.sqrt()))
 }
@@ -191,7 +175,6 @@ const NO_PAIR: u32 = u32::MAX;
 /// Squared residuals over their variances, as bits, of every `step`-th block.
 struct Sample<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     step: usize,
     squares: &'a mut [u32],
@@ -201,9 +184,8 @@ impl WithLocate for Sample<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        let (moved, rules, step) = (self.moved, self.rules, self.step);
-        let parts =
-            self.squares.par_chunks_mut(SAMPLED_PER_TASK * BLOCK).zip(self.blocks.par_chunks(SAMPLED_PER_TASK * step));
+        let (moved, step) = (self.moved, self.step);
+        let parts = self.squares.par_chunks_mut(2 * CHUNK * BLOCK).zip(self.blocks.par_chunks(2 * CHUNK * step));
         parts.for_each(|(squares, blocks)| {
             let mut places = squares.chunks_exact_mut(BLOCK);
             let work = |pairs: &Pairs| {
@@ -214,15 +196,15 @@ impl WithLocate for Sample<'_, '_> {
                     }
                 }
             };
-            pulp::Arch::new().dispatch(LocatedVisit { all: Visit { moved, rules, blocks, step, work }, locate });
+            run_wide(Visit { moved, blocks, step, work }, locate);
         });
     }
 }
 
 /// Nodes that fall on target planes, and how many of them are accepted.
-pub fn agreement(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> (usize, usize) {
+pub(crate) fn agreement(moved: &Moved<'_>, blocks: &[Block]) -> (usize, usize) {
     let (mut met, mut accepted) = (0, 0);
-    visit(moved, rules, blocks, |pairs| {
+    visit(moved, blocks, |pairs| {
         met += pairs.met.iter().filter(|m| **m).count();
         accepted += pairs.weight.iter().filter(|w| **w > 0.0).count();
     });
@@ -230,14 +212,13 @@ pub fn agreement(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> (usize, 
 }
 
 /// Calls a function with the pairs of each block.
-pub(crate) fn visit(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], work: impl FnMut(&Pairs)) {
-    with_locate(moved.target, Visit { moved, rules, blocks, step: 1, work });
+pub(crate) fn visit(moved: &Moved<'_>, blocks: &[Block], work: impl FnMut(&Pairs)) {
+    with_locate(moved.target, Visit { moved, blocks, step: 1, work });
 }
 
 /// Calls a function with the pairs of every `step`-th block.
 struct Visit<'a, 'b, F> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     step: usize,
     work: F,
@@ -246,24 +227,10 @@ struct Visit<'a, 'b, F> {
 impl<F: FnMut(&Pairs)> WithLocate for Visit<'_, '_, F> {
     type Output = ();
 
-    fn run<L: Locate>(self, locate: L) {
-        pulp::Arch::new().dispatch(LocatedVisit { all: self, locate });
-    }
-}
-
-struct LocatedVisit<'a, 'b, F, L> {
-    all: Visit<'a, 'b, F>,
-    locate: L,
-}
-
-impl<F: FnMut(&Pairs), L: Locate> pulp::WithSimd for LocatedVisit<'_, '_, F, L> {
-    type Output = ();
-
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let mut all = self.all;
-        for block in all.blocks.iter().step_by(all.step) {
-            (all.work)(&all.moved.pairs(self.locate, all.rules, block));
+    fn run<L: Locate>(mut self, locate: L) {
+        for block in self.blocks.iter().step_by(self.step) {
+            (self.work)(&self.moved.pairs(locate, block));
         }
     }
 }

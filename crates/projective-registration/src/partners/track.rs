@@ -24,24 +24,43 @@ pub(crate) struct Track {
     pub over_sigma: f64,
 }
 
-/// The blocks of a level.
-pub(crate) fn blocks(source: &OrganisedFrame, level: usize) -> &[Block] {
-    &source.points.blocks[..source.grid.levels[level]]
+/// The frame that is moved, and the one that it is moved onto.
+#[derive(Clone, Copy)]
+pub(crate) struct Frames<'a> {
+    pub source: &'a OrganisedFrame,
+    pub target: &'a OrganisedFrame,
 }
 
-/// A quarter of the nodes, where these are enough.
-pub(crate) fn finest_part(source: &OrganisedFrame) -> &[Block] {
-    let part = STRIDES.len() - 2;
-    if source.points.counts[part] >= FEWEST_POINTS { blocks(source, part) } else { &source.points.blocks }
+impl<'a> Frames<'a> {
+    /// Of the source, metre: the unit of lengths.
+    pub(crate) fn radius_m(self) -> f64 {
+        self.source.points.radius_m
+    }
+
+    /// The blocks of a level.
+    pub(crate) fn blocks(self, level: usize) -> &'a [Block] {
+        &self.source.points.blocks[..self.source.grid.levels[level]]
+    }
+
+    pub(crate) fn all_blocks(self) -> &'a [Block] {
+        &self.source.points.blocks
+    }
+
+    /// A quarter of the nodes, where these are enough.
+    pub(crate) fn finest_part(self) -> &'a [Block] {
+        let part = STRIDES.len() - 2;
+        if self.source.points.counts[part] >= FEWEST_POINTS { self.blocks(part) } else { self.all_blocks() }
+    }
+
+    /// The source where a track has it, and about what its motions are.
+    pub(crate) fn moved(self, track: &Track) -> (Moved<'a>, Centred) {
+        let frame = self.source.centred(&track.pose);
+        let moved = Moved::new(self.source, self.target, &track.pose, &frame.centre, frame.radius_m);
+        (moved.by(track.rules), frame)
+    }
 }
 
 /// Whether a step is shorter than a tenth of its standard deviation: pairs that change back and forth.
 pub(crate) fn is_within_noise(step: &Vector6<f64>, covariance: &Matrix6<f64>) -> bool {
     covariance.cholesky().is_some_and(|c| step.dot(&c.solve(step)) < 0.01)
-}
-
-pub(crate) fn moved<'a>(track: &Track, source: &'a OrganisedFrame, target: &'a OrganisedFrame) -> (Moved<'a>, Centred) {
-    let centre = (track.pose * nalgebra::Point3::from(source.points.centre)).coords;
-    let frame = Centred { centre, radius_m: source.points.radius_m.max(f64::MIN_POSITIVE) };
-    (Moved::new(source, target, &track.pose, &frame.centre, frame.radius_m), frame)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -13,6 +13,7 @@ use crate::preparation::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
 use crate::preparation::planes::{FREEDOM, MOMENT, PlaneRow, ROUNDING};
 use crate::preparation::projection::Projection;
 use point_cloud::Cloud;
+use rigid_pose::{Centred, require_length};
 
 /// Windows whose mean square deviation exceeds that of most by this factor hold no plane.
 const LARGEST_MISFIT: f32 = 3.0;
@@ -61,7 +62,7 @@ impl OrganisedFrame {
     /// theirs.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
+    /// [`InputError::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
     /// not lie on the rays of their pixels.
     pub fn new(projection: &Arc<Projection>, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<Self> {
         let grid = Arc::clone(&projection.grids[0]);
@@ -94,14 +95,8 @@ impl OrganisedFrame {
     pub fn update(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<()> {
         let (width, height) = (self.projection.width(), self.projection.height());
         let expected = width * height;
-        if points.len() != expected {
-            return Err(Error::LengthMismatch { what: "points of the frame", expected, found: points.len() });
-        }
-        if let Some(sigma) = sigma
-            && sigma.len() != expected
-        {
-            return Err(Error::LengthMismatch { what: "sigma", expected, found: sigma.len() });
-        }
+        require_length("points of the frame", expected, points.len())?;
+        require_length("sigma", expected, sigma.map(<[f32]>::len))?;
         check_rays(&self.projection, points)?;
         self.has_sigma = sigma.is_some();
         for level in 0..self.projection.grids.len() {
@@ -196,6 +191,12 @@ impl OrganisedFrame {
         memory.push((self.scratch.as_ptr() as usize, self.scratch.capacity()));
         memory.push((self.points.blocks.as_ptr() as usize, self.points.blocks.capacity()));
         memory
+    }
+
+    /// Its middle at a pose, and its radius: about what its motions are.
+    pub(crate) fn centred(&self, pose: &Isometry3<f64>) -> Centred {
+        let centre = (pose * Point3::from(self.points.centre)).coords;
+        Centred { centre, radius_m: self.points.radius_m.max(f64::MIN_POSITIVE) }
     }
 
     /// Takes another of the projection's grids.

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rigid_pose::{InputError, require_length, require_option};
+
 use nalgebra::Point3;
 
 use crate::error::{Error, Result};
@@ -36,19 +38,15 @@ impl Projection {
     /// A pinhole camera: focal lengths along columns and rows, and the principal point `(col, row)`, pixels.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`] where the frame has fewer than 8 or more than 16384 pixels along a side, a focal length
+    /// [`InputError::InvalidOption`] where the frame has fewer than 8 or more than 16384 pixels along a side, a focal length
     /// is not positive, or the principal point is not finite.
     pub fn pinhole(width: usize, height: usize, focal_px: [f64; 2], centre_px: [f64; 2]) -> Result<Self> {
         check_size(width, height)?;
         for value in focal_px {
-            if !(value > 1e-3 && value < 1e9) {
-                return Err(Error::InvalidOption { name: "focal_px", value, domain: "0.001 to 1e9" });
-            }
+            require_option("focal_px", value, "0.001 to 1e9", |focal| focal > 1e-3 && focal < 1e9)?;
         }
         for value in centre_px {
-            if value.is_nan() || value.abs() > 1e9 {
-                return Err(Error::InvalidOption { name: "centre_px", value, domain: "-1e9 to 1e9" });
-            }
+            require_option("centre_px", value, "-1e9 to 1e9", |centre| centre.abs() <= 1e9)?;
         }
         let lens = Lens::Pinhole { focal_px, centre_px };
         let ray = |col: usize, row: usize| {
@@ -64,19 +62,17 @@ impl Projection {
     /// y/z is made that tells the pixel.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] where the directions do not fill the frame; [`Error::NonFinite`];
+    /// [`InputError::LengthMismatch`] where the directions do not fill the frame; [`InputError::NonFinite`];
     /// [`Error::DegenerateRay`] where a ray does not lead forwards (-z) or neighbouring rays coincide or cross;
-    /// [`Error::InvalidOption`] for the size, as [`Projection::pinhole`].
+    /// [`InputError::InvalidOption`] for the size, as [`Projection::pinhole`].
     pub fn from_directions(width: usize, height: usize, directions: &[[f64; 3]]) -> Result<Self> {
         check_size(width, height)?;
         let expected = width * height;
-        if directions.len() != expected {
-            return Err(Error::LengthMismatch { what: "directions", expected, found: directions.len() });
-        }
+        require_length("directions", expected, directions.len())?;
         let mut rays = Vec::with_capacity(expected);
         for (index, d) in directions.iter().enumerate() {
             if d.iter().any(|v| !v.is_finite()) {
-                return Err(Error::NonFinite { what: "directions", index });
+                return Err(InputError::NonFinite { what: "directions", index }.into());
             }
             let ray = [-d[0] / d[2], -d[1] / d[2]];
             // Rays beyond 85 degrees from the axis.
@@ -124,10 +120,7 @@ impl Projection {
 
 fn check_size(width: usize, height: usize) -> Result<()> {
     for side in [width, height] {
-        if !(8..=MAX_SIDE).contains(&side) {
-            let (name, value) = ("width and height", side as f64);
-            return Err(Error::InvalidOption { name, value, domain: "8 to 16384" });
-        }
+        require_option("width and height", side as f64, "8 to 16384", |_| (8..=MAX_SIDE).contains(&side))?;
     }
     Ok(())
 }

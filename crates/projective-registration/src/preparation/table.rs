@@ -2,8 +2,6 @@
 
 use crate::error::{Error, Result};
 
-/// Entries of a table along one side per pixel of the frame.
-const ENTRIES_PER_PIXEL: f64 = 1.0;
 /// Newton steps within one quadrangle of four rays: its mapping is almost linear.
 const STEPS: usize = 4;
 /// How far outside its quadrangle an entry is still filled, in pixels: bilinear reading needs neighbours at the rim.
@@ -28,11 +26,10 @@ impl Table {
         let bound = |i: usize, best: fn(f64, f64) -> f64| rays.iter().map(|r| r[i]).fold(f64::NAN, best);
         let low = [bound(0, f64::min), bound(1, f64::min)];
         let high = [bound(0, f64::max), bound(1, f64::max)];
-        let sides = [width, height].map(|s| (s as f64 * ENTRIES_PER_PIXEL) as usize + 1);
-        let density = [0, 1].map(|i| (sides[i] - 1) as f64 / (high[i] - low[i]));
-        // A rim of two entries, for reading at the border.
+        // One entry a pixel along each side, and a rim of two for reading at the border.
+        let density = [0, 1].map(|i| [width, height][i] as f64 / (high[i] - low[i]));
         let origin = [0, 1].map(|i| low[i] - 2.0 / density[i]);
-        let (cols, rows) = (sides[0] + 4, sides[1] + 4);
+        let (cols, rows) = (width + 5, height + 5);
         let mut table = Self { origin, density, cols, rows, pixels: vec![[f32::NAN; 2]; cols * rows] };
         let mut distances = vec![f64::INFINITY; cols * rows];
         for row in 0..height - 1 {

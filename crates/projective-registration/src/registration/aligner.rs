@@ -3,26 +3,27 @@
 use nalgebra::{Isometry3, Matrix6, Vector6};
 use statistics::SIGMA_OF_MAD;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::options::FrameAlignmentOptions;
 use crate::partners::pairs::Rules;
 use crate::partners::sums::{SUMS, median_residual, normal_equations};
-use crate::partners::track::{FEWEST_POINTS, Track, blocks, is_within_noise, moved};
+use crate::partners::track::{FEWEST_POINTS, Frames, Track, is_within_noise};
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::STRIDES;
-use crate::registration::quality::{Cell, Hold, Verdict};
+use crate::registration::quality::{Cell, Verdict};
 use crate::shared_error::Sighting;
-use icp_registration::quality::Residuals;
-use icp_registration::{DegeneracyPolicy, IcpResult, StopReason, TUKEY};
-use rigid_pose::{Centred, is_finite, pose_difference, step_pose, symmetrised};
+use icp_registration::{IcpResult, StopReason, TUKEY};
+use rigid_pose::{Centred, InputError, require_pose, symmetrised};
 
 /// Of the biweight.
 pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
+/// Fewest pairs, and nodes of a frame, that a pose is told by: three an unknown and two more. Frames that overlap have hundreds.
+pub(crate) const FEWEST_PAIRS: usize = 20;
 /// Residuals from which scales are taken.
 pub(crate) const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.
-const COARSE_ITERATIONS: usize = 8;
+pub(crate) const COARSE_ITERATIONS: usize = 8;
 /// First steps, which are least squares over all that is in reach.
 const WIDE_ITERATIONS: usize = 3;
 /// Coarse levels end when a step is below this, in units of the radius.
@@ -34,8 +35,8 @@ const COARSE_TOLERANCE: f64 = 1e-3;
 /// streams, keep a [`FrameAligner`].
 ///
 /// # Errors
-/// [`Error::TooFewPoints`] for frames without planes, [`Error::TooFewCorrespondences`] where frames do not overlap at
-/// the guess, [`Error::NonFinite`] for the guess, [`Error::InvalidOption`].
+/// [`InputError::TooFewPoints`] for frames without planes, [`InputError::TooFewCorrespondences`] where frames do not overlap at
+/// the guess, [`InputError::NonFinite`] for the guess, [`InputError::InvalidOption`].
 pub fn align_frames(
     source: &OrganisedFrame,
     target: &OrganisedFrame,
@@ -57,7 +58,7 @@ pub struct FrameAligner {
 
 impl FrameAligner {
     /// # Errors
-    /// [`Error::InvalidOption`].
+    /// [`InputError::InvalidOption`].
     pub fn new(options: FrameAlignmentOptions) -> Result<Self> {
         options.validate()?;
         Ok(Self {
@@ -74,148 +75,83 @@ impl FrameAligner {
         &self.options
     }
 
-    pub(crate) fn registered(
-        &mut self,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-    ) -> Result<IcpResult> {
-        if !is_finite(guess) {
-            return Err(Error::NonFinite { what: "the guess", index: 0 });
-        }
-        for (what, frame) in [("the source frame", source), ("the target frame", target)] {
-            if frame.len() < self.options.min_correspondences {
-                let needed = self.options.min_correspondences;
-                return Err(Error::TooFewPoints { what, found: frame.len(), needed });
+    pub(crate) fn registered(&mut self, frames: Frames<'_>, guess: &Isometry3<f64>) -> Result<IcpResult> {
+        require_pose("the guess", guess)?;
+        for (what, frame) in [("the source frame", frames.source), ("the target frame", frames.target)] {
+            if frame.len() < FEWEST_PAIRS {
+                return Err(InputError::TooFewPoints { what, found: frame.len(), needed: FEWEST_PAIRS }.into());
             }
         }
-        let rules = Rules {
-            extra_variance: 0.0,
-            reach: BIWEIGHT,
-            least_cosine: self.options.max_normal_angle_rad.cos() as f32,
-        };
+        let rules = Rules { extra_variance: 0.0, reach: BIWEIGHT };
         let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
-        let first = self.follow_levels(track.clone(), source, target, guess);
-        if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
+        let first = self.follow_levels(track.clone(), frames);
+        if self.options.other_starts == 0 {
             return first.map(|(_, result)| result);
         }
-        self.searched(first, &track, source, target)
+        self.searched(first, &track, frames)
     }
 
     /// The first level that is passed; none where all but the last have too few nodes.
-    pub(crate) fn first_level(&self, source: &OrganisedFrame) -> Option<usize> {
+    pub(crate) fn first_level(&self, frames: Frames<'_>) -> Option<usize> {
         let coarsest = STRIDES.len() - self.options.levels;
-        (coarsest..STRIDES.len() - 1).find(|level| source.points.counts[*level] >= FEWEST_POINTS)
+        (coarsest..STRIDES.len() - 1).find(|level| frames.source.points.counts[*level] >= FEWEST_POINTS)
     }
 
     /// The whole way from the guess.
-    fn follow_levels(
-        &mut self,
-        mut track: Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-    ) -> Result<(Track, IcpResult)> {
-        match self.first_level(source) {
-            Some(first) => track = self.start(&track, source, target, blocks(source, first))?,
-            None => self.open(&mut track, source, target, &source.points.blocks)?,
+    fn follow_levels(&mut self, mut track: Track, frames: Frames<'_>) -> Result<(Track, IcpResult)> {
+        match self.first_level(frames) {
+            Some(first) => track = self.start(&track, frames, frames.blocks(first))?,
+            None => self.open(&mut track, frames, frames.all_blocks())?,
         }
-        self.finish(track, source, target, guess)
-    }
-
-    /// The levels after the first one, and the result.
-    fn finish(
-        &mut self,
-        mut track: Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-    ) -> Result<(Track, IcpResult)> {
-        self.approach(&mut track, source, target)?;
-        self.end(track, source, target, guess, self.hold())
+        self.approach(&mut track, frames)?;
+        self.end(track, frames)
     }
 
     /// The levels between the first and the last.
-    pub(crate) fn approach(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-    ) -> Result<()> {
-        for level in self.first_level(source).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
-            self.descend(track, source, target, blocks(source, level))?;
+    pub(crate) fn approach(&mut self, track: &mut Track, frames: Frames<'_>) -> Result<()> {
+        for level in self.first_level(frames).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
+            self.descend(track, frames, frames.blocks(level), COARSE_ITERATIONS)?;
         }
         Ok(())
     }
 
     /// The last level, and the result.
-    pub(crate) fn end(
-        &mut self,
-        mut track: Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-        hold: Hold,
-    ) -> Result<(Track, IcpResult)> {
-        let stop = self.settle(&mut track, source, target, hold)?;
-        let result = self.result(&track, source, target, guess, stop)?;
+    pub(crate) fn end(&mut self, mut track: Track, frames: Frames<'_>) -> Result<(Track, IcpResult)> {
+        let stop = self.settle(&mut track, frames)?;
+        let result = self.result(&track, frames, stop)?;
         Ok((track, result))
     }
 
     /// Sets the variance of what is not aligned from the residuals at the guess.
-    pub(crate) fn open(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        blocks: &[Block],
-    ) -> Result<()> {
-        let radius = target.points.radius_m.max(source.points.radius_m);
+    pub(crate) fn open(&mut self, track: &mut Track, frames: Frames<'_>, blocks: &[Block]) -> Result<()> {
+        let radius = frames.target.points.radius_m.max(frames.radius_m());
         track.rules.extra_variance = (radius * radius) as f32;
-        let moved = moved(track, source, target);
-        let median = median_residual(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch)
-            .ok_or_else(|| self.too_few(0, source.len(), track))?;
+        let moved = frames.moved(track);
+        let median = median_residual(&moved.0, blocks, SAMPLE, &mut self.scratch)
+            .ok_or_else(|| Self::too_few(0, frames.source.len(), track))?;
         let scale = SIGMA_OF_MAD * median * radius;
         track.rules.extra_variance = (scale * scale) as f32;
         Ok(())
     }
 
-    /// Passes one level.
+    /// Passes one level with at most so many iterations.
     pub(crate) fn descend(
         &mut self,
         track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        blocks: &[Block],
-    ) -> Result<()> {
-        self.descend_by(track, source, target, blocks, COARSE_ITERATIONS)
-    }
-
-    /// Passes one level with at most so many iterations.
-    pub(crate) fn descend_by(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         blocks: &[Block],
         iterations: usize,
     ) -> Result<()> {
-        if self.hold() == Hold::Undetermined {
-            let (moved, frame) = moved(track, source, target);
-            let limit = self.max_motion_sigma_m(&frame);
-            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Misaligned, &mut self.cells)?;
-            track.free = verdict.free();
-        }
         for _ in 0..iterations {
             if track.iterations >= self.options.max_iterations {
                 break;
             }
             let wide = track.iterations < WIDE_ITERATIONS;
             track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
-            let (step, frame) = self.step(track, source, target, blocks, 1e-4)?;
+            let (step, frame) = self.step(track, frames, blocks, 1e-4)?;
             if !wide {
-                self.narrow(track, source, target, blocks);
+                self.narrow(track, frames, blocks);
             }
             if step < COARSE_TOLERANCE * frame.radius_m && !wide {
                 break;
@@ -225,9 +161,9 @@ impl FrameAligner {
     }
 
     /// Lowers the variance of what is not aligned to what the residuals show.
-    fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, blocks: &[Block]) {
-        let (moved, _) = moved(track, source, target);
-        let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
+    fn narrow(&mut self, track: &mut Track, frames: Frames<'_>, blocks: &[Block]) {
+        let (moved, _) = frames.moved(track);
+        let median = median_residual(&moved, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
         let square = (SIGMA_OF_MAD * median).powi(2) as f32;
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
     }
@@ -236,15 +172,14 @@ impl FrameAligner {
     pub(crate) fn step(
         &mut self,
         track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         blocks: &[Block],
         damping: f64,
     ) -> Result<(f64, Centred)> {
-        let (moved, frame) = moved(track, source, target);
-        let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
-        if normal.pairs < self.options.min_correspondences {
-            return Err(self.too_few(normal.pairs, source.len(), track));
+        let (moved, frame) = frames.moved(track);
+        let normal = normal_equations(&moved, blocks, &mut self.chunks);
+        if normal.pairs < FEWEST_PAIRS {
+            return Err(Self::too_few(normal.pairs, frames.source.len(), track).into());
         }
         let step = normal.equations.step(&track.free, damping)?;
         track.pose = frame.moved(&track.pose, &step);
@@ -254,35 +189,23 @@ impl FrameAligner {
         Ok((step.norm(), frame))
     }
 
-    fn result(
-        &mut self,
-        track: &Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-        stop: StopReason,
-    ) -> Result<IcpResult> {
-        let (moved, frame) = moved(track, source, target);
-        let limit = self.max_motion_sigma_m(&frame);
-        let verdict =
-            Verdict::new(&moved, &track.rules, &source.points.blocks, limit, Residuals::Settled, &mut self.cells)?;
+    /// What the pairs of some nodes say about the pose.
+    pub(crate) fn verdict(&mut self, track: &Track, frames: Frames<'_>, blocks: &[Block]) -> Result<Verdict> {
+        let (moved, frame) = frames.moved(track);
+        let limit_m = self.options.max_motion_sigma_m.unwrap_or(FrameAlignmentOptions::OPEN * frame.radius_m);
+        Verdict::new(&moved, blocks, limit_m, &mut self.cells)
+    }
+
+    fn result(&mut self, track: &Track, frames: Frames<'_>, stop: StopReason) -> Result<IcpResult> {
+        let verdict = self.verdict(track, frames, frames.all_blocks())?;
+        let frame = frames.source.centred(&track.pose);
         let normal = &verdict.normal;
         let mut pose = track.pose;
         if self.options.noise_fraction.is_some() && stop == StopReason::Converged {
             pose = frame.moved(&pose, &normal.equations.step(&track.free, 0.0)?);
         }
         let to_tangent = frame.tangent_from_motion(&pose);
-        let centred = if let Some(prior) = &self.options.prior {
-            let what = "the tangent of the pose";
-            let from_tangent = to_tangent.try_inverse().ok_or(Error::Numerical { what, why: "it is singular" })?;
-            let offset = from_tangent * pose_difference(&pose, guess);
-            let prior = symmetrised(&(from_tangent * prior * from_tangent.transpose()));
-            let (step, covariance) = verdict.fused(&offset, &prior)?;
-            pose = step_pose(&pose, &(to_tangent * step));
-            covariance
-        } else {
-            verdict.covariance(frame.radius_m, self.hold())
-        };
+        let centred = verdict.covariance(frame.radius_m);
         let stop = if stop == StopReason::MaxIterations && is_within_noise(&track.last_step, &centred) {
             StopReason::WithinNoise
         } else {
@@ -291,7 +214,7 @@ impl FrameAligner {
         Ok(IcpResult {
             target_from_source: pose,
             covariance: symmetrised(&(to_tangent * centred * to_tangent.transpose())),
-            overlap: normal.pairs as f64 / source.len() as f64,
+            overlap: normal.pairs as f64 / frames.source.len() as f64,
             rms_m: (normal.square / normal.weight).sqrt(),
             iterations: track.iterations,
             stop,
@@ -301,21 +224,11 @@ impl FrameAligner {
         })
     }
 
-    /// With a prior, what the frames do not determine comes from it, and must not slide before.
-    pub(crate) fn hold(&self) -> Hold {
-        let hold = self.options.degeneracy == DegeneracyPolicy::HoldAtGuess || self.options.prior.is_some();
-        if hold { Hold::Undetermined } else { Hold::Nothing }
-    }
-
-    pub(crate) fn max_motion_sigma_m(&self, frame: &Centred) -> f64 {
-        self.options.max_motion_sigma_m.unwrap_or(frame.radius_m / 300.0)
-    }
-
-    fn too_few(&self, found: usize, of: usize, track: &Track) -> Error {
-        Error::TooFewCorrespondences {
+    fn too_few(found: usize, of: usize, track: &Track) -> InputError {
+        InputError::TooFewCorrespondences {
             found,
             of,
-            needed: self.options.min_correspondences,
+            needed: FEWEST_PAIRS,
             max_distance_m: f64::from(track.rules.reach * track.rules.extra_variance.sqrt()),
             iteration: track.iterations,
         }

@@ -1,8 +1,9 @@
 //! Random and systematic errors of a registration, told apart.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::Isometry3;
 
 use crate::error::Result;
+use crate::partners::track::Frames;
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::aligner::FrameAligner;
 use crate::shared_error::{Influence, SharedError};
@@ -35,14 +36,8 @@ impl FrameAligner {
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
     ) -> Result<(IcpResult, Option<Influence>)> {
-        let result = self.registered(source, target, guess)?;
-        let pose = &result.target_from_source;
-        let mut influence = target.influence(source, pose, &mut self.sightings, &mut self.scratch);
-        if let (Some(prior), Some(influence)) = (&self.options.prior, &mut influence) {
-            // What the guess holds, the frames do not move.
-            let from_guess = prior.cholesky().map_or_else(Matrix6::zeros, |c| c.inverse());
-            influence.pose = (Matrix6::identity() - result.covariance * from_guess) * influence.pose;
-        }
+        let result = self.registered(Frames { source, target }, guess)?;
+        let influence = target.influence(source, &result.target_from_source, &mut self.sightings, &mut self.scratch);
         Ok((result, influence))
     }
 }

@@ -12,6 +12,7 @@ use std::ops::Add;
 use nalgebra::{Isometry3, Vector3};
 
 use crate::partners::pairs::{Locate, Moved, WithLocate, with_locate};
+use crate::partners::track::Frames;
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::{BLOCK, STRIDES};
@@ -87,35 +88,29 @@ pub fn frame_consistency(
 ) -> FrameConsistency {
     let level = STRIDES.iter().position(|s| *s <= stride).unwrap_or(STRIDES.len() - 1);
     let tolerance = tolerance_m.unwrap_or(TOLERANCE * source.points.radius_m.max(target.points.radius_m));
-    consistency(source, target, target_from_source, level, tolerance)
+    consistency(Frames { source, target }, target_from_source, level, tolerance)
 }
 
 /// As [`frame_consistency`], with the number of a level.
 pub(crate) fn consistency(
-    source: &OrganisedFrame,
-    target: &OrganisedFrame,
+    frames: Frames<'_>,
     pose: &Isometry3<f64>,
     level: usize,
     tolerance_m: f64,
 ) -> FrameConsistency {
     let (there, back) = rayon::join(
-        || one_way(source, target, pose, level, tolerance_m),
-        || one_way(target, source, &pose.inverse(), level, tolerance_m),
+        || one_way(frames, pose, level, tolerance_m),
+        || one_way(Frames { source: frames.target, target: frames.source }, &pose.inverse(), level, tolerance_m),
     );
     there + back
 }
 
-fn one_way(
-    source: &OrganisedFrame,
-    target: &OrganisedFrame,
-    pose: &Isometry3<f64>,
-    level: usize,
-    tolerance_m: f64,
-) -> FrameConsistency {
-    let blocks = &source.points.blocks[..source.grid.levels[level]];
+fn one_way(frames: Frames<'_>, pose: &Isometry3<f64>, level: usize, tolerance_m: f64) -> FrameConsistency {
+    let Frames { source, target } = frames;
     let moved = Moved::new(source, target, pose, &Vector3::zeros(), 1.0);
     let mut counts = FrameConsistency::default();
-    let compare = Compare { moved: &moved, blocks, tolerance: tolerance_m as f32, counts: &mut counts };
+    let compare =
+        Compare { moved: &moved, blocks: frames.blocks(level), tolerance: tolerance_m as f32, counts: &mut counts };
     with_locate(target, compare);
     let out_of_view = source.points.counts[level] - counts.compared() - counts.hidden;
     FrameConsistency { out_of_view, ..counts }
@@ -156,28 +151,15 @@ struct Compare<'a, 'b> {
 impl WithLocate for Compare<'_, '_> {
     type Output = ();
 
-    fn run<L: Locate>(self, locate: L) {
-        pulp::Arch::new().dispatch(LocatedCompare { all: self, locate });
-    }
-}
-
-struct LocatedCompare<'a, 'b, L> {
-    all: Compare<'a, 'b>,
-    locate: L,
-}
-
-impl<L: Locate> pulp::WithSimd for LocatedCompare<'_, '_, L> {
-    type Output = ();
-
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn run<L: Locate>(self, locate: L) {
         // Agreeing, contradicting, hidden, unclear.
         let mut sums = [[0_u32; BLOCK]; 4];
-        for block in self.all.blocks {
-            let distances = self.all.moved.distances(self.locate, block);
+        for block in self.blocks {
+            let distances = self.moved.distances(locate, block);
             for k in 0..BLOCK {
                 let (residual, cosine) = (distances.residual[k], distances.cosine[k]);
-                let tolerance = self.all.tolerance + SIGMAS * distances.variance[k].sqrt();
+                let tolerance = self.tolerance + SIGMAS * distances.variance[k].sqrt();
                 // Normals lead away from the cameras: what lies in front of a plane is below it. NaN fails everywhere.
                 let near = residual.abs() <= tolerance;
                 let agrees = near && cosine >= LEAST_COSINE;
@@ -190,7 +172,7 @@ impl<L: Locate> pulp::WithSimd for LocatedCompare<'_, '_, L> {
             }
         }
         let [agreeing, contradicting, hidden, unclear] = sums.map(|lanes| lanes.iter().sum::<u32>() as usize);
-        *self.all.counts = FrameConsistency { agreeing, contradicting, hidden, unclear, out_of_view: 0 };
+        *self.counts = FrameConsistency { agreeing, contradicting, hidden, unclear, out_of_view: 0 };
     }
 }
 

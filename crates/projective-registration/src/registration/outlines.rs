@@ -4,16 +4,15 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
-use crate::partners::pairs::{Locate, WithLocate, with_locate};
-use crate::partners::track::Track;
+use crate::partners::map::AGREEING_SIGMA;
+use crate::partners::pairs::{Locate, SinglePose, WithLocate, node_at, with_locate};
+use crate::partners::track::{Frames, Track};
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::aligner::FrameAligner;
-use crate::registration::quality::Hold;
 use icp_registration::{IcpResult, MotionKind, UndeterminedMotion};
 
-/// A point contradicts a plane that it lies in front of by this share of the radius and this multiple of its noise.
+/// A point contradicts a plane that it lies in front of by this share of the radius and what noise does.
 const TOLERANCE: f64 = 0.025;
-const SIGMAS: f32 = 4.0;
 /// Distance of the places that are tried along a motion, in units of the radius, and places on either side.
 const STEP: f64 = 0.006;
 const STEPS: usize = 50;
@@ -26,20 +25,20 @@ const LIMIT: f64 = 4.0;
 
 /// The points at jumps of two frames.
 struct Outlines<'a> {
-    frames: [&'a OrganisedFrame; 2],
+    frames: Frames<'a>,
     points: [Vec<[f32; 3]>; 2],
     tolerance_m: f32,
 }
 
 impl<'a> Outlines<'a> {
-    fn new(source: &'a OrganisedFrame, target: &'a OrganisedFrame) -> Self {
-        let tolerance_m = (TOLERANCE * source.points.radius_m) as f32;
-        Self { frames: [source, target], points: [source.at_jumps(), target.at_jumps()], tolerance_m }
+    fn new(frames: Frames<'a>) -> Self {
+        let tolerance_m = (TOLERANCE * frames.radius_m()) as f32;
+        Self { frames, points: [frames.source.at_jumps(), frames.target.at_jumps()], tolerance_m }
     }
 
     /// Points at jumps of either frame that lie in front of planes of the other; where there are more than `most`, more than that.
     fn contradicting(&self, pose: &Isometry3<f64>, most: usize) -> usize {
-        let ([source, target], tolerance_m) = (self.frames, self.tolerance_m);
+        let (Frames { source, target }, tolerance_m) = (self.frames, self.tolerance_m);
         let there = with_locate(target, InFront { target, points: &self.points[0], pose, tolerance_m, most });
         let (pose, most) = (&pose.inverse(), most.saturating_sub(there));
         there + with_locate(source, InFront { target: source, points: &self.points[1], pose, tolerance_m, most })
@@ -47,7 +46,7 @@ impl<'a> Outlines<'a> {
 
     /// How far along a motion the frames contradict each other least, in metre at the radius.
     fn least(&self, pose: &Isometry3<f64>, motion: &UndeterminedMotion) -> f64 {
-        let radius_m = self.frames[0].points.radius_m;
+        let radius_m = self.frames.radius_m();
         let places: Vec<f64> = (0..=2 * STEPS).map(|k| (k as f64 - STEPS as f64) * STEP * radius_m).collect();
         let here = self.contradicting(pose, usize::MAX) as f64 / CHANCE;
         let against = |place: &f64| {
@@ -94,12 +93,10 @@ impl FrameAligner {
     pub(crate) fn placed_by_outlines(
         &mut self,
         mut best: (Track, IcpResult),
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
+        frames: Frames<'_>,
     ) -> (Track, IcpResult) {
-        let outlines = Outlines::new(source, target);
-        let radius_m = source.points.radius_m;
+        let outlines = Outlines::new(frames);
+        let radius_m = frames.radius_m();
         // What is moved along one motion tells the others better.
         for _ in 0..best.1.degenerate.len() {
             let (mut track, result) = (best.0.clone(), &best.1);
@@ -109,7 +106,11 @@ impl FrameAligner {
             }
             track.iterations = 0;
             let against = outlines.contradicting(&result.target_from_source, usize::MAX);
-            match self.end(track, source, target, guess, Hold::Undetermined) {
+            // What the geometry does not determine stays.
+            let held = self
+                .verdict(&track, frames, frames.all_blocks())
+                .map(|verdict| Track { free: verdict.free(), ..track });
+            match held.and_then(|track| self.end(track, frames)) {
                 Ok(other) if outlines.contradicting(&other.1.target_from_source, usize::MAX) <= against => best = other,
                 _ => break,
             }
@@ -145,25 +146,15 @@ impl WithLocate for InFront<'_> {
     type Output = usize;
 
     fn run<L: Locate>(self, locate: L) -> usize {
-        let matrix = self.pose.rotation.to_rotation_matrix();
-        let r = [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)] as f32));
-        let t = [0, 1, 2].map(|i| self.pose.translation.vector[i] as f32);
-        let grid = &self.target.grid;
+        let pose = SinglePose::new(self.pose);
         let mut in_front = 0;
-        for v in self.points {
-            let at = |i: usize| r[i][0] * v[0] + r[i][1] * v[1] + r[i][2] * v[2] + t[i];
-            let p = [at(0), at(1), at(2)];
-            let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]);
-            let (col, row) = (col + 0.5, row + 0.5);
-            // NaN fails.
-            if !(p[2] < 0.0 && col >= 0.0 && row >= 0.0 && col < grid.cols as f32 && row < grid.rows as f32) {
-                continue;
-            }
-            let node = row as usize * grid.cols + col as usize;
+        for point in self.points {
+            let p = pose.moved(*point);
+            let Some(node) = node_at(&self.target.grid, locate, p) else { continue };
             let [a, b, c, d] = self.target.planes[node];
             // Normals lead away from the camera.
             let residual = a * p[0] + b * p[1] + c * p[2] - d;
-            in_front += usize::from(residual < -(self.tolerance_m + SIGMAS * self.target.sigma[node]));
+            in_front += usize::from(residual < -(self.tolerance_m + AGREEING_SIGMA * self.target.sigma[node]));
             if in_front > self.most {
                 break;
             }
@@ -209,7 +200,7 @@ mod tests {
     #[test]
     fn where_one_side_is_open_nothing_runs_away() {
         let (target, source) = (seen_from([9.0, 0.0]), seen_from([9.1, 0.0]));
-        let outlines = Outlines::new(&source, &target);
+        let outlines = Outlines::new(Frames { source: &source, target: &target });
         let slide = UndeterminedMotion {
             kind: MotionKind::Translation,
             axis: Vector3::x(),

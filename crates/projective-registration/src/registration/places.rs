@@ -3,8 +3,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::partners::track::{Track, blocks};
-use crate::preparation::frame::OrganisedFrame;
+use crate::partners::track::{Frames, Track};
 use crate::registration::aligner::FrameAligner;
 use crate::registration::consistency::{DOUBT_LEVEL, TOLERANCE, consistency};
 use crate::registration::search::weighed;
@@ -55,13 +54,8 @@ impl Places {
 
     /// What would tell a translation that is left open may lie out of reach: looks along it, in steps that outlines then
     /// refine. Without it, three in a hundred more pairs at half overlap stay open and one less is right.
-    pub(crate) fn along(
-        track: &Track,
-        motions: &[UndeterminedMotion],
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-    ) -> Self {
-        let radius_m = source.points.radius_m;
+    pub(crate) fn along(track: &Track, motions: &[UndeterminedMotion], frames: Frames<'_>) -> Self {
+        let radius_m = frames.radius_m();
         let mut places = Self::default();
         let slide = SLIDE * radius_m;
         for motion in motions.iter().filter(|motion| motion.kind == MotionKind::Translation) {
@@ -70,7 +64,7 @@ impl Places {
                 other.pose.translation.vector += motion.axis * (k * slide);
                 other.rules.extra_variance = (0.25 * slide * slide) as f32;
                 other.iterations = 0;
-                let counts = consistency(source, target, &other.pose, DOUBT_LEVEL, slide);
+                let counts = consistency(frames, &other.pose, DOUBT_LEVEL, slide);
                 places.keep(weighed(&counts), &other, radius_m);
             }
         }
@@ -80,16 +74,16 @@ impl Places {
 
 impl FrameAligner {
     /// Passes the first level from starts all around the guess and keeps the places where the frames agree best.
-    pub(crate) fn look_around(&self, start: &Track, source: &OrganisedFrame, target: &OrganisedFrame) -> Places {
+    pub(crate) fn look_around(&self, start: &Track, frames: Frames<'_>) -> Places {
         let mut places = Places::default();
-        let Some(level) = self.first_level(source) else { return places };
-        let radius = source.points.radius_m;
+        let Some(level) = self.first_level(frames) else { return places };
+        let radius = frames.radius_m();
         // Each start on an aligner of its own: what comes out does not hang on the threads.
         let followed = starts(&start.pose, radius).into_par_iter().map_with(self.clone(), |aligner, pose| {
-            let (mut track, blocks) = (Track { pose, ..start.clone() }, blocks(source, level));
-            aligner.open(&mut track, source, target, blocks).ok()?;
-            aligner.descend_by(&mut track, source, target, blocks, ITERATIONS).ok()?;
-            let counts = consistency(source, target, &track.pose, level, TOLERANCE * radius);
+            let (mut track, blocks) = (Track { pose, ..start.clone() }, frames.blocks(level));
+            aligner.open(&mut track, frames, blocks).ok()?;
+            aligner.descend(&mut track, frames, blocks, ITERATIONS).ok()?;
+            let counts = consistency(frames, &track.pose, level, TOLERANCE * radius);
             Some((weighed(&counts), track))
         });
         let followed: Vec<Option<(f64, Track)>> = followed.collect();

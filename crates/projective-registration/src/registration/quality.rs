@@ -13,19 +13,17 @@
 use nalgebra::{DMatrix, Matrix6, Vector6};
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
-use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
+use crate::error::Result;
+use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_locate};
 use crate::partners::sums::{self, Normal, derivatives};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};
 use icp_registration::UndeterminedMotion;
-use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, Residuals, SIGNIFICANCE, expanded};
-use rigid_pose::{Centred, symmetric, symmetrised};
+use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
+use rigid_pose::{Centred, symmetric};
 
-/// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above
-/// which a cell is not one of these.
-const CLEAR_SIGNIFICANCE: f64 = 5.0;
-const CLIP: f64 = 5.0;
+/// What stands out beside cells that carry no information: its multiple of their scatter, and of the middle cell for one that is none of them.
+const CLEAR: f64 = 5.0;
 /// Share of the largest information that rounding can imitate (single precision).
 const ROUNDING: f64 = 1e-7;
 /// Smallest variance of the scores as a share of what the noise of the nodes lets expect: independent frames show about a
@@ -35,17 +33,6 @@ const LEAST_SCORE: f64 = 0.25;
 const PARTS: usize = 4;
 /// 6 scores and 21 products.
 const SUMS: usize = 6 + 21;
-/// Blocks whose totals are summed in single precision.
-const CHUNK: usize = 32;
-
-/// Motions that keep the guess.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Hold {
-    /// None.
-    Nothing,
-    /// Those that the geometry does not determine.
-    Undetermined,
-}
 
 /// Sums over the pairs of one cell.
 pub(crate) type Cell = [f64; SUMS];
@@ -59,25 +46,18 @@ pub(crate) struct Verdict {
 
 impl Verdict {
     /// Judges the blocks of the source; motions with a predicted sigma above `max_sigma_m` are undetermined.
-    pub(crate) fn new(
-        moved: &Moved<'_>,
-        rules: &Rules,
-        blocks: &[Block],
-        max_sigma_m: f64,
-        residuals: Residuals,
-        cells: &mut Vec<Cell>,
-    ) -> Result<Self> {
-        let (cells, normal) = fill(moved, rules, blocks, cells);
+    pub(crate) fn new(moved: &Moved<'_>, blocks: &[Block], max_sigma_m: f64, cells: &mut Vec<Cell>) -> Result<Self> {
+        let (cells, normal) = fill(moved, blocks, cells);
         let information = symmetric(&cells.iter().fold([0.0; 21], |mut sum, cell| {
             sum.iter_mut().zip(&cell[6..]).for_each(|(s, c)| *s += c);
             sum
         }));
         let used = cells.iter().filter(|c| c[6] + c[12] + c[17] != 0.0).count();
-        let score = match residuals {
-            Residuals::Misaligned => independent_scores(moved, rules, blocks),
-            Residuals::Settled if used >= FEWEST_CELLS => clustered(cells) * (used as f64 / (used as f64 - 6.0)),
+        let score = if used >= FEWEST_CELLS {
+            clustered(cells) * (used as f64 / (used as f64 - 6.0))
+        } else {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            Residuals::Settled => independent_scores(moved, rules, blocks) * (normal.pairs as f64 / used.max(1) as f64),
+            independent_scores(moved, blocks) * (normal.pairs as f64 / used.max(1) as f64)
         };
         // Frames that are copies of each other leave no residuals: their noise is still that of their nodes.
         let missing = (LEAST_SCORE - score.trace() / normal.equations.matrix.trace()).max(0.0);
@@ -98,8 +78,9 @@ impl Verdict {
     }
 
     /// Covariance of motions `[dt, rho w]`; what is not known at all gets the radius as sigma.
-    pub fn covariance(&self, radius_m: f64, held: Hold) -> Matrix6<f64> {
-        let (basis, inside) = self.known(held);
+    pub(crate) fn covariance(&self, radius_m: f64) -> Matrix6<f64> {
+        let known: Vec<&Direction> = self.directions.all().iter().filter(|d| d.sigma_m.is_finite()).collect();
+        let (basis, inside) = self.directions.sandwich(&known, |_| None);
         let known = expanded(&basis, &inside);
         // Rounding of what nothing is unknown of would outweigh small variances.
         if basis.ncols() == 6 {
@@ -107,26 +88,6 @@ impl Verdict {
         }
         let all = DMatrix::identity(inside.nrows(), inside.nrows());
         known + (Matrix6::identity() - expanded(&basis, &all)) * radius_m.powi(2)
-    }
-
-    /// The most probable motion and its covariance, where a guess lies `offset` away and has the covariance `prior`.
-    /// What the pairs do not determine comes from the guess alone.
-    pub(crate) fn fused(&self, offset: &Vector6<f64>, prior: &Matrix6<f64>) -> Result<(Vector6<f64>, Matrix6<f64>)> {
-        let what = "the information of pairs and prior";
-        let error = Error::Numerical { what, why: "it is not positive definite" };
-        let (basis, inside) = self.known(Hold::Undetermined);
-        let from_pairs = inside.cholesky().ok_or(error.clone())?.inverse();
-        let from_guess = prior.cholesky().ok_or(error.clone())?.inverse();
-        let information = from_guess + expanded(&basis, &from_pairs);
-        let covariance = symmetrised(&information).cholesky().ok_or(error)?.inverse();
-        Ok((covariance * (from_guess * offset), covariance))
-    }
-
-    /// Basis of the motions that are known, and their covariance in it.
-    fn known(&self, held: Hold) -> (DMatrix<f64>, DMatrix<f64>) {
-        let is_known = |d: &&Direction| d.sigma_m.is_finite() && (d.determined || held == Hold::Nothing);
-        let known: Vec<&Direction> = self.directions.all().iter().filter(is_known).collect();
-        self.directions.sandwich(&known, |_| None)
     }
 }
 
@@ -148,10 +109,10 @@ fn is_significant(cells: &[Cell], information: f64, vector: &Vector6<f64>) -> bo
     }
     each.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
     let Some(middle) = each.get(count / 2) else { return false };
-    let usual = CLIP * middle.abs();
+    let usual = CLEAR * middle.abs();
     let scatter = each.iter().map(|f| f.abs().min(usual).powi(2)).sum::<f64>().sqrt();
     let top = each.iter().copied().fold(0.0, f64::max);
-    information - top > CLEAR_SIGNIFICANCE * scatter
+    information - top > CLEAR * scatter
 }
 
 /// Covariance of the summed score from the scatter of its sums over cells.
@@ -175,9 +136,9 @@ fn form(upper: &[f64], v: &Vector6<f64>) -> f64 {
 }
 
 /// Covariance of the summed score of pairs that share nothing.
-fn independent_scores(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> Matrix6<f64> {
+fn independent_scores(moved: &Moved<'_>, blocks: &[Block]) -> Matrix6<f64> {
     let mut sums = [0.0; 21];
-    sums::visit(moved, rules, blocks, |pairs| {
+    sums::visit(moved, blocks, |pairs| {
         let rows = derivatives(&pairs.lever, &pairs.normal);
         let mut k = 0;
         for r in 0..6 {
@@ -196,12 +157,12 @@ fn independent_scores(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> Mat
 }
 
 /// Sums over the cells, and the normal equations.
-fn fill<'c>(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], cells: &'c mut Vec<Cell>) -> (&'c [Cell], Normal) {
+fn fill<'c>(moved: &Moved<'_>, blocks: &[Block], cells: &'c mut Vec<Cell>) -> (&'c [Cell], Normal) {
     let count = moved.source.grid.cell_count;
     cells.clear();
     cells.resize(PARTS * count, [0.0; SUMS]);
     let mut parts = [[0.0; sums::SUMS]; PARTS];
-    with_locate(moved.target, Fill { moved, rules, blocks, cells, parts: &mut parts });
+    with_locate(moved.target, Fill { moved, blocks, cells, parts: &mut parts });
     let (first, others) = cells.split_at_mut(count);
     for part in others.chunks(count) {
         for (cell, other) in first.iter_mut().zip(part) {
@@ -214,7 +175,6 @@ fn fill<'c>(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], cells: &'c mut V
 
 struct Fill<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
     blocks: &'a [Block],
     cells: &'a mut [Cell],
     parts: &'a mut [[f64; sums::SUMS]; PARTS],
@@ -224,20 +184,18 @@ impl WithLocate for Fill<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        let (moved, rules) = (self.moved, self.rules);
+        let moved = self.moved;
         let size = self.blocks.len().div_ceil(PARTS).max(1);
         let sums = self.cells.par_chunks_mut(self.cells.len() / PARTS).zip(self.parts.par_iter_mut());
         let blocks = self.blocks.par_chunks(size).zip(moved.source.grid.cells.par_chunks(size));
         sums.zip(blocks).for_each(|((cells, totals), (blocks, cell_of))| {
-            pulp::Arch::new().dispatch(Part { moved, rules, locate, blocks, cell_of, cells, totals });
+            run_wide(Part { moved, blocks, cell_of, cells, totals }, locate);
         });
     }
 }
 
-struct Part<'a, 'b, L> {
+struct Part<'a, 'b> {
     moved: &'a Moved<'b>,
-    rules: &'a Rules,
-    locate: L,
     blocks: &'a [Block],
     /// Cells of the nodes.
     cell_of: &'a [[u16; BLOCK]],
@@ -245,16 +203,16 @@ struct Part<'a, 'b, L> {
     totals: &'a mut [f64; sums::SUMS],
 }
 
-impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
+impl WithLocate for Part<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+    fn run<L: Locate>(mut self, locate: L) {
         let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS] };
-        for (blocks, cells) in self.blocks.chunks(CHUNK).zip(self.cell_of.chunks(CHUNK)) {
+        for (blocks, cells) in self.blocks.chunks(sums::CHUNK).zip(self.cell_of.chunks(sums::CHUNK)) {
             let mut totals = [[0.0; BLOCK]; sums::SUMS];
             for (block, cell_of) in blocks.iter().zip(cells) {
-                let pairs = self.moved.pairs(self.locate, self.rules, block);
+                let pairs = self.moved.pairs(locate, block);
                 self.add(&mut run, &mut totals, &pairs, cell_of);
             }
             sums::hand_over(self.totals, &totals);
@@ -269,7 +227,7 @@ struct Run {
     lanes: [[f32; BLOCK]; SUMS],
 }
 
-impl<L: Locate> Part<'_, '_, L> {
+impl Part<'_, '_> {
     #[inline(always)]
     fn add(&mut self, run: &mut Run, totals: &mut [[f32; BLOCK]; sums::SUMS], pairs: &Pairs, cell_of: &[u16; BLOCK]) {
         let along_target = derivatives(&pairs.lever, &pairs.normal);

@@ -5,8 +5,7 @@ use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::partners::track::Track;
-use crate::preparation::frame::OrganisedFrame;
+use crate::partners::track::{Frames, Track};
 use crate::registration::aligner::FrameAligner;
 use crate::registration::consistency::{DOUBT_LEVEL, FrameConsistency, TOLERANCE, consistency};
 use crate::registration::places::Places;
@@ -28,26 +27,25 @@ impl FrameAligner {
         &mut self,
         first: Result<(Track, IcpResult)>,
         start: &Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
     ) -> Result<IcpResult> {
         let mut best = first;
-        if !best.as_ref().is_ok_and(|(_, result)| agrees(source, target, result)) {
-            let places = self.look_around(start, source, target);
-            best = self.best_of(best, &places, start, source, target);
+        if !best.as_ref().is_ok_and(|(_, result)| agrees(frames, result)) {
+            let places = self.look_around(start, frames);
+            best = self.best_of(best, &places, frames);
         }
         if let Ok((track, result)) = &best
             && result.degenerate.iter().any(|motion| motion.kind == MotionKind::Translation)
-            && agrees(source, target, result)
+            && agrees(frames, result)
         {
-            let places = Places::along(track, &result.degenerate, source, target);
-            best = self.best_of(best, &places, start, source, target);
+            let places = Places::along(track, &result.degenerate, frames);
+            best = self.best_of(best, &places, frames);
         }
         best.map(|best| {
             let is_open = !best.1.degenerate.is_empty();
-            let best = if is_open { self.placed_by_outlines(best, source, target, &start.pose) } else { best };
+            let best = if is_open { self.placed_by_outlines(best, frames) } else { best };
             let mut result = best.1;
-            if result.stop != StopReason::MaxIterations && !agrees(source, target, &result) {
+            if result.stop != StopReason::MaxIterations && !agrees(frames, &result) {
                 result.stop = StopReason::Contradicted;
             }
             result
@@ -59,16 +57,14 @@ impl FrameAligner {
         &mut self,
         best: Result<(Track, IcpResult)>,
         places: &Places,
-        start: &Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
     ) -> Result<(Track, IcpResult)> {
-        let merit = |pose: &Isometry3<f64>| weighed(&compared(source, target, pose));
+        let merit = |pose: &Isometry3<f64>| weighed(&compared(frames, pose));
         let places: Vec<&Track> = places.all().collect();
         // Each place on an aligner of its own: what comes out does not hang on the threads.
         let approached = places.into_par_iter().map_with(self.clone(), |aligner, place| {
             let mut track = place.clone();
-            aligner.approach(&mut track, source, target).ok().map(|()| (merit(&track.pose), track))
+            aligner.approach(&mut track, frames).ok().map(|()| (merit(&track.pose), track))
         });
         let approached: Vec<Option<(f64, Track)>> = approached.collect();
         let most = best.as_ref().map_or(0.0, |(_, result)| merit(&result.target_from_source));
@@ -79,7 +75,7 @@ impl FrameAligner {
             }
         }
         let Some((_, track)) = chosen else { return best };
-        match self.end(track, source, target, &start.pose, self.hold()) {
+        match self.end(track, frames) {
             Ok(other) if merit(&other.1.target_from_source) > LEAST_GAIN * most => Ok(other),
             _ => best,
         }
@@ -87,18 +83,18 @@ impl FrameAligner {
 }
 
 /// How frames agree at a pose, where it is to be judged.
-fn compared(source: &OrganisedFrame, target: &OrganisedFrame, pose: &Isometry3<f64>) -> FrameConsistency {
-    consistency(source, target, pose, DOUBT_LEVEL, TOLERANCE * source.points.radius_m)
+fn compared(frames: Frames<'_>, pose: &Isometry3<f64>) -> FrameConsistency {
+    consistency(frames, pose, DOUBT_LEVEL, TOLERANCE * frames.radius_m())
 }
 
 /// Whether frames at a pose share enough, and hardly contradict each other. On uneven surfaces nodes lie near planes with
 /// another normal at right poses too: as often as within each frame.
-fn agrees(source: &OrganisedFrame, target: &OrganisedFrame, result: &IcpResult) -> bool {
-    let counts = compared(source, target, &result.target_from_source);
+fn agrees(frames: Frames<'_>, result: &IcpResult) -> bool {
+    let counts = compared(frames, &result.target_from_source);
     let (compared, hidden) = (counts.compared() as f64, counts.hidden as f64);
     let beside = |unclear: f64| counts.contradicting as f64 + unclear <= MOST_WRONG * compared;
-    let tolerance = TOLERANCE * source.points.radius_m;
-    let expected = || 0.5 * compared * (source.unevenness(tolerance) + target.unevenness(tolerance));
+    let tolerance = TOLERANCE * frames.radius_m();
+    let expected = || 0.5 * compared * (frames.source.unevenness(tolerance) + frames.target.unevenness(tolerance));
     (beside(counts.unclear as f64) || beside((counts.unclear as f64 - expected()).max(0.0)))
         && hidden <= MOST_HIDDEN * (compared + hidden)
         && counts.agreeing as f64 >= LEAST_AGREEING * counts.all() as f64

@@ -5,13 +5,10 @@ use statistics::SIGMA_OF_MAD;
 
 use crate::error::Result;
 use crate::partners::sums::median_residual;
-use crate::partners::track::{Track, finest_part, is_within_noise, moved};
+use crate::partners::track::{Frames, Track, is_within_noise};
 use crate::preparation::blocks::Block;
-use crate::preparation::frame::OrganisedFrame;
 use crate::registration::aligner::{BIWEIGHT, FrameAligner, SAMPLE};
-use crate::registration::quality::{Hold, Verdict};
 use icp_registration::StopReason;
-use icp_registration::quality::Residuals;
 
 /// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
 /// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
@@ -24,34 +21,21 @@ const WANDERING: usize = 4;
 
 impl FrameAligner {
     /// Iterates on all points until the pose stands.
-    pub(crate) fn settle(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        hold: Hold,
-    ) -> Result<StopReason> {
-        let blocks = &source.points.blocks[..];
-        if hold == Hold::Undetermined {
-            let (moved, frame) = moved(track, source, target);
-            let limit = self.max_motion_sigma_m(&frame);
-            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
-            track.free = verdict.free();
-        }
+    pub(crate) fn settle(&mut self, track: &mut Track, frames: Frames<'_>) -> Result<StopReason> {
+        let blocks = frames.all_blocks();
         track.rules.extra_variance = 0.0;
         let mut narrowings = NARROWINGS;
         // A quarter of the nodes first: only the last steps need all.
         let fraction = self.options.noise_fraction.unwrap_or(COARSE_FRACTION);
-        self.iterate(track, source, target, finest_part(source), fraction, &mut narrowings)?;
-        self.iterate(track, source, target, blocks, self.options.noise_fraction.unwrap_or(0.0), &mut narrowings)
+        self.iterate(track, frames, frames.finest_part(), fraction, &mut narrowings)?;
+        self.iterate(track, frames, blocks, self.options.noise_fraction.unwrap_or(0.0), &mut narrowings)
     }
 
     /// Iterates on some nodes until a step is short, or shorter than so many standard deviations, or the pose only wanders.
     fn iterate(
         &mut self,
         track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         blocks: &[Block],
         over_sigma: f64,
         narrowings: &mut usize,
@@ -59,10 +43,10 @@ impl FrameAligner {
         let (mut steps, mut way, mut most) = (0, Vector6::zeros(), 1);
         while track.iterations < self.options.max_iterations {
             if *narrowings > 0 {
-                self.rescale(track, source, target, *narrowings == NARROWINGS);
+                self.rescale(track, frames, *narrowings == NARROWINGS);
                 *narrowings -= 1;
             }
-            let (step, frame) = self.step(track, source, target, blocks, 0.0)?;
+            let (step, frame) = self.step(track, frames, blocks, 0.0)?;
             if *narrowings > 0 {
                 continue;
             }
@@ -76,7 +60,7 @@ impl FrameAligner {
                 break;
             }
             if steps == most {
-                if most >= WANDERING && self.is_within_noise(track, source, target, blocks, &way)? {
+                if most >= WANDERING && self.is_within_noise(track, frames, blocks, &way)? {
                     return Ok(StopReason::WithinNoise);
                 }
                 (steps, way, most) = (0, Vector6::zeros(), 2 * most);
@@ -89,25 +73,22 @@ impl FrameAligner {
     fn is_within_noise(
         &mut self,
         track: &Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         blocks: &[Block],
         way: &Vector6<f64>,
     ) -> Result<bool> {
-        let (moved, frame) = moved(track, source, target);
-        let limit = self.max_motion_sigma_m(&frame);
-        let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
-        Ok(is_within_noise(way, &verdict.covariance(frame.radius_m, self.hold())))
+        let verdict = self.verdict(track, frames, blocks)?;
+        Ok(is_within_noise(way, &verdict.covariance(frames.source.centred(&track.pose).radius_m)))
     }
 
     /// Sets the reach of the kernel from the residuals.
-    fn rescale(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, first: bool) {
-        let (moved, _) = moved(track, source, target);
+    fn rescale(&mut self, track: &mut Track, frames: Frames<'_>, first: bool) {
         if first {
             track.rules.reach = 10.0 * BIWEIGHT;
         }
-        let blocks = &source.points.blocks;
-        let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
+        let (moved, _) = frames.moved(track);
+        let blocks = frames.all_blocks();
+        let median = median_residual(&moved, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
         let scale = (SIGMA_OF_MAD * median).max(0.1) as f32;
         track.rules.reach = BIWEIGHT * scale;
     }

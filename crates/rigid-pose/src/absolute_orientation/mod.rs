@@ -8,7 +8,7 @@ mod svd;
 
 use nalgebra::{Isometry3, Matrix4, Matrix6, Point3, Quaternion, SymmetricEigen, UnitQuaternion};
 
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use moments::Moments;
 
 /// Relative gap of the criterion below which two rotations fit equally well to within rounding.
@@ -65,8 +65,8 @@ pub struct Similarity {
 /// Closed form after `[Horn1987]`; the covariance is that of the least-squares problem at the solution.
 ///
 /// # Errors
-/// [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::NotPositive`], [`Error::TooFewPoints`] below three pairs
-/// of positive weight, [`Error::Collinear`] naming the side, [`Error::AmbiguousRotation`].
+/// [`InputError::LengthMismatch`], [`InputError::NonFinite`], [`InputError::NotPositive`], [`InputError::TooFewPoints`] below three pairs
+/// of positive weight, [`InputError::Collinear`] naming the side, [`InputError::AmbiguousRotation`].
 pub fn absolute_orientation(
     source: &[Point3<f64>],
     target: &[Point3<f64>],
@@ -117,13 +117,13 @@ pub fn absolute_orientation_with_scale(
 
 /// Refuses a gap between the two best rotations, relative to the criterion, that is rounding.
 fn require_gap(gap: f64) -> Result<()> {
-    if gap.is_nan() || gap <= AMBIGUOUS_GAP { Err(Error::AmbiguousRotation { gap }) } else { Ok(()) }
+    if gap.is_nan() || gap <= AMBIGUOUS_GAP { Err(InputError::AmbiguousRotation { gap }) } else { Ok(()) }
 }
 
 /// The eigenvector of the largest eigenvalue as a rotation; `unit` scales the gap to the second.
 fn quaternion_of_largest(matrix: Matrix4<f64>, unit: f64, what: &'static str) -> Result<UnitQuaternion<f64>> {
     let eigen = SymmetricEigen::try_new(matrix, 1e-16, 1000)
-        .ok_or(Error::Numerical { what, why: "the iteration did not converge" })?;
+        .ok_or(InputError::Numerical { what, why: "the iteration did not converge" })?;
     let mut order = [0, 1, 2, 3];
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     require_gap((eigen.eigenvalues[order[0]] - eigen.eigenvalues[order[1]]) / unit)?;

@@ -3,11 +3,10 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, Vector3};
 
 use super::Orientation;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
+use crate::requirements::{require_length, require_points};
 use crate::tangent::symmetrised;
 
-/// Coordinates beyond this would overflow when squared and summed.
-const LARGEST_COORDINATE: f64 = 1e100;
 /// Second principal extent over the first below which points count as collinear: the rotation about the line would be
 /// known to no better than rounding over this ratio.
 const COLLINEAR_RATIO: f64 = 1e-7;
@@ -29,7 +28,7 @@ impl Moments {
         let weight_of = |i: usize| weights.map_or(1.0, |w| w[i]);
         let count = (0..source.len()).filter(|&i| weight_of(i) > 0.0).count();
         if count < 3 {
-            return Err(Error::TooFewPoints { what: "absolute orientation", found: count, needed: 3 });
+            return Err(InputError::TooFewPoints { what: "absolute orientation", found: count, needed: 3 });
         }
         let weight: f64 = (0..source.len()).map(weight_of).sum();
         let mean = |points: &[Point3<f64>]| {
@@ -97,35 +96,20 @@ impl Moments {
 }
 
 fn check_input(source: &[Point3<f64>], target: &[Point3<f64>], weights: Option<&[f64]>) -> Result<()> {
-    if target.len() != source.len() {
-        let (expected, found) = (source.len(), target.len());
-        return Err(Error::LengthMismatch { what: "target points", expected, found });
-    }
-    check_points("source points", source)?;
-    check_points("target points", target)?;
+    require_length("target points", source.len(), target.len())?;
+    require_points("source points", source)?;
+    require_points("target points", target)?;
     let Some(weights) = weights else { return Ok(()) };
-    if weights.len() != source.len() {
-        return Err(Error::LengthMismatch { what: "weights", expected: source.len(), found: weights.len() });
-    }
+    require_length("weights", source.len(), weights.len())?;
     for (index, &value) in weights.iter().enumerate() {
         if !value.is_finite() {
-            return Err(Error::NonFinite { what: "weights", index });
+            return Err(InputError::NonFinite { what: "weights", index });
         }
         if value < 0.0 {
-            return Err(Error::NotPositive { what: "weights", index, value });
+            return Err(InputError::NotPositive { what: "weights", index, value });
         }
     }
     Ok(())
-}
-
-/// Refuses coordinates that are not finite, or too large to be squared.
-fn check_points(what: &'static str, points: &[Point3<f64>]) -> Result<()> {
-    // NaN fails the comparison.
-    let is_usable = |point: &Point3<f64>| point.iter().all(|c| c.abs() < LARGEST_COORDINATE);
-    match points.iter().position(|point| !is_usable(point)) {
-        Some(index) => Err(Error::NonFinite { what, index }),
-        None => Ok(()),
-    }
 }
 
 fn check_spread(what: &'static str, scatter: &Matrix3<f64>) -> Result<()> {
@@ -135,5 +119,5 @@ fn check_spread(what: &'static str, scatter: &Matrix3<f64>) -> Result<()> {
     let minors = minor(0, 1) + minor(0, 2) + minor(1, 2);
     let largest = scatter.trace();
     let ratio = if largest > 0.0 { (minors.max(0.0)).sqrt() / largest } else { 0.0 };
-    if ratio < COLLINEAR_RATIO { Err(Error::Collinear { what, ratio }) } else { Ok(()) }
+    if ratio < COLLINEAR_RATIO { Err(InputError::Collinear { what, ratio }) } else { Ok(()) }
 }

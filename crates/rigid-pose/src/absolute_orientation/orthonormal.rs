@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
 
 use super::require_gap;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 
 /// `R = M (Mᵀ M)^(-1/2)` with `M = Σ w q' p'^T`.
 ///
@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 /// plane sets need no special case, and a mirror image is never returned.
 pub(super) fn rotation(cross: &Matrix3<f64>) -> Result<UnitQuaternion<f64>> {
     let m = cross.transpose() / cross.norm().max(f64::MIN_POSITIVE);
-    let eigen = SymmetricEigen::try_new(m.transpose() * m, 1e-16, 1000).ok_or(Error::Numerical {
+    let eigen = SymmetricEigen::try_new(m.transpose() * m, 1e-16, 1000).ok_or(InputError::Numerical {
         what: "the square root of the moments",
         why: "the eigenvalue iteration did not converge",
     })?;

@@ -37,7 +37,7 @@ impl SurfaceMap {
     /// A map without surfaces.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`](crate::Error::InvalidOption).
+    /// [`InputError::InvalidOption`](rigid_pose::InputError::InvalidOption).
     pub fn new(options: MapOptions) -> Result<Self> {
         options.validate()?;
         let voxel_m = options.voxel_m;

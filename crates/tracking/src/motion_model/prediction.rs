@@ -8,10 +8,8 @@ use projective_registration::ByField;
 use rigid_pose::Uncertain;
 use rigid_pose::pose_difference;
 
-/// Frames after a loss for which the last velocity is carried on.
-const CARRIED_FRAMES: usize = 5;
-/// Longest gap that the last velocity bridges, in intervals of the frames it was had from.
-const MOST_INTERVALS: f64 = 5.0;
+/// Intervals of the frames that the last velocity was had from for which it is carried on: lost frames, or a gap between two.
+const CARRIED: usize = 5;
 /// Weight of the latest frame in the mean disturbance.
 const LATEST: f64 = 0.2;
 /// Smallest disturbance, as a change of the motion from one frame to the next, relative to that motion.
@@ -96,7 +94,7 @@ impl Last {
         }
         let seconds = timestamp_s - self.timestamp_s;
         // A frame that came much later than the ones before says nothing about where the camera went.
-        let bridged = self.lost_frames < CARRIED_FRAMES && seconds <= MOST_INTERVALS * self.interval_s;
+        let bridged = self.lost_frames < CARRIED && seconds <= CARRIED as f64 * self.interval_s;
         let Some(velocity) = self.velocity.filter(|_| bridged) else {
             let motion = turn.map_or_else(
                 || Uncertain::exact(Isometry3::identity()),

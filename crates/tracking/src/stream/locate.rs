@@ -8,14 +8,13 @@ use crate::motion_model::velocity::Velocity;
 use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
 use pose_graph::{Relation, is_likely};
-use projective_registration::{Agreement, ByField, Field, FrameAligner, Influence, OrganisedFrame};
-use rigid_pose::Uncertain;
-use rigid_pose::{step_pose, symmetrised};
+use projective_registration::{
+    Agreement, ByField, Error as FrameError, Field, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame,
+};
+use rigid_pose::{InputError, Uncertain, step_pose, symmetrised};
 
 /// Keyframes tried beside the reference.
 const NEIGHBOURS: usize = 2;
-/// Share of the radius beyond whose standard deviation a motion is weak.
-const WEAK_SHARE: f64 = 1.0 / 300.0;
 /// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
 const BY_VELOCITY: f64 = 0.25;
 /// Where a frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard deviation at the
@@ -53,7 +52,7 @@ pub(crate) struct Measured {
 impl Measured {
     /// Whether the geometry determines all motions well, and nothing speaks against the pose.
     fn is_firm(&self, radius_m: f64) -> bool {
-        self.is_sound() && self.pose.sigma_at(radius_m) <= WEAK_SHARE * radius_m
+        self.is_sound() && self.pose.sigma_at(radius_m) <= FrameAlignmentOptions::OPEN * radius_m
     }
 
     /// Whether the frames agree at the pose as they do at right ones. Frames that have slid along a wall fit as well, and
@@ -74,7 +73,9 @@ impl Measured {
         let scale = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, radius_m, radius_m, radius_m));
         let back = Matrix6::from_diagonal(&scale.diagonal().map(|s| 1.0 / s));
         let mut motions = symmetrised(&(scale * self.pose.covariance * scale)).symmetric_eigen();
-        for variance in motions.eigenvalues.iter_mut().filter(|v| **v > (WEAK_SHARE * radius_m).powi(2)) {
+        for variance in
+            motions.eigenvalues.iter_mut().filter(|v| **v > (FrameAlignmentOptions::OPEN * radius_m).powi(2))
+        {
             *variance = variance.max(radius_m * radius_m);
         }
         let covariance = symmetrised(&(back * motions.recompose() * back));
@@ -273,8 +274,8 @@ fn register(
     field: &Field,
 ) -> Result<Measured, LossReason> {
     let (result, influence) = aligner.align_apart(source, target, guess).map_err(|error| match error {
-        projective_registration::Error::TooFewPoints { .. } => LossReason::TooFewPoints,
-        projective_registration::Error::TooFewCorrespondences { .. } => LossReason::TooLittleOverlap,
+        FrameError::Input(InputError::TooFewPoints { .. }) => LossReason::TooFewPoints,
+        FrameError::Input(InputError::TooFewCorrespondences { .. }) => LossReason::TooLittleOverlap,
         _ => LossReason::NotConverged,
     })?;
     let aligned = result.target_from_source;

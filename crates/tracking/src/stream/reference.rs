@@ -20,12 +20,12 @@ impl Tracker {
             && overlap >= self.options.keyframe_overlap
             && let Some(measured) = self.closing(k, reference, reference_from_camera)
         {
-            self.refer_to(k, &measured);
+            self.refer_to(k, Some(&measured));
             self.adjust();
             return;
         }
         let new = self.keyframes.add(&self.current, reference, reference_from_camera);
-        self.refer_to_itself(new);
+        self.refer_to(new, None);
         if let Some(influence) = influence {
             self.learn(influence);
         }
@@ -60,22 +60,13 @@ impl Tracker {
         self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b, alike: 1.0 }).then_some(measured)
     }
 
-    fn refer_to(&mut self, keyframe: usize, measured: &Measured) {
+    /// The frame is known from keyframe `k` by a registration, or is that keyframe.
+    fn refer_to(&mut self, k: usize, measured: Option<&Measured>) {
         if let Some(last) = &mut self.last {
-            last.keyframe = keyframe;
-            last.own = measured.own();
-            last.by_field = measured.by_field();
-            last.shared = measured.shared();
-            last.velocity = last.velocity.map(|velocity| velocity.at_origin());
-        }
-    }
-
-    fn refer_to_itself(&mut self, keyframe: usize) {
-        if let Some(last) = &mut self.last {
-            last.keyframe = keyframe;
-            last.own = Uncertain::exact(Isometry3::identity());
-            last.by_field = ByField::zeros();
-            last.shared = Matrix6::zeros();
+            last.keyframe = k;
+            last.own = measured.map_or_else(|| Uncertain::exact(Isometry3::identity()), Measured::own);
+            last.by_field = measured.map_or_else(ByField::zeros, Measured::by_field);
+            last.shared = measured.map_or_else(Matrix6::zeros, Measured::shared);
             last.velocity = last.velocity.map(|velocity| velocity.at_origin());
         }
     }

@@ -15,7 +15,8 @@ impl Tracker {
         }
         let joined: Vec<bool> = (0..=new).map(|k| k == new || self.keyframes.graph.joined(k, new)).collect();
         let others = |k: usize| !joined[k];
-        let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, near);
+        let candidates =
+            self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, OrganisedFrame::nearness);
         let mut closing = Vec::new();
         for (overlap, k) in candidates.into_iter().take(self.options.loop_attempts) {
             if overlap < Agreement::LEAST_OVERLAP {
@@ -33,9 +34,4 @@ impl Tracker {
         let alike = (closing.len() as f64).midpoint(1.0);
         self.keyframes.graph.take(closing.into_iter().map(|edge| Edge { alike, ..edge }));
     }
-}
-
-/// Fraction of a frame that may lie on the surfaces of another, measured with systematic errors.
-fn near(target: &OrganisedFrame, source: &OrganisedFrame, pose: &Isometry3<f64>, most: usize) -> f64 {
-    target.nearness(source, pose, most)
 }

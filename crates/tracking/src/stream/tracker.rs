@@ -14,13 +14,12 @@ use crate::stream::beside::Beside;
 use crate::stream::keyframes::Keyframes;
 use crate::stream::locate::{Fix, Measured};
 use crate::tracked::{LossReason, TrackedPose, TrackingState};
-use icp_registration::DegeneracyPolicy;
 use point_cloud::Cloud;
 use pose_graph::Relation;
 use projective_registration::{
     ByField, FieldMatrix, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, Projection, SharedError,
 };
-use rigid_pose::Uncertain;
+use rigid_pose::{InputError, Uncertain};
 
 /// Smallest fraction of the nodes of a frame that must have a plane: below, it is blank.
 const FEWEST_PLANES: f64 = 0.03;
@@ -57,12 +56,11 @@ impl Tracker {
     /// A tracker of frames of one camera.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`], [`Error::NonFinite`] for the options.
+    /// [`InputError::InvalidOption`], [`InputError::NonFinite`] for the options.
     pub fn new(projection: &Arc<Projection>, options: TrackerOptions) -> Result<Self> {
         options.validate()?;
         let nothing = vec![[f64::NAN; 3]; projection.width() * projection.height()];
         let mut alignment = options.alignment.clone();
-        alignment.degeneracy = DegeneracyPolicy::Report;
         alignment.other_starts = 0;
         let blank = OrganisedFrame::new(projection, &nothing, None)?;
         Ok(Self {
@@ -87,7 +85,7 @@ impl Tracker {
     /// A frame that cannot be tracked is no error: its state says so, and later frames are sought again.
     ///
     /// # Errors
-    /// [`Error::NotAscending`] where the time is not later than that of the frame before, [`Error::Numerical`] for a
+    /// [`Error::NotAscending`] where the time is not later than that of the frame before, [`InputError::Numerical`] for a
     /// prior that is not finite or whose covariance is not positive definite, [`Error::Frames`] for
     /// frames of another camera. Nothing has changed then.
     pub fn track(
@@ -102,7 +100,11 @@ impl Tracker {
             return Err(Error::NotAscending { what: "times of the frames", index: self.trajectory.len() });
         }
         if prior.is_some_and(|prior| !prior.is_sound()) {
-            return Err(Error::Numerical { what: "the motion prior", why: "its covariance is not positive definite" });
+            return Err(InputError::Numerical {
+                what: "the motion prior",
+                why: "its covariance is not positive definite",
+            }
+            .into());
         }
         self.current.update(points, sigma)?;
         let pose = match self.last.take() {

@@ -16,11 +16,10 @@ impl Tracker {
         ranked: &[(f32, usize, Isometry3<f64>)],
         lost_frames: usize,
     ) -> Option<Measured> {
-        let options = match &self.options.relocalisation {
-            Relocalisation::Projective | Relocalisation::Beside => return None,
-            Relocalisation::Coarse => CoarseOptions::default(),
-            Relocalisation::CoarseWith(options) => (**options).clone(),
-        };
+        if self.options.relocalisation != Relocalisation::Coarse {
+            return None;
+        }
+        let options = CoarseOptions::default();
         let &(_, k, _) = ranked.get(lost_frames % ranked.len().max(1))?;
         let source = FeatureCloud::new(&self.current.to_cloud(), &options).ok()?;
         let keyframe = &mut self.keyframes.list[k];

@@ -2,8 +2,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::association::{Stamped, associate};
 use super::statistics::ErrorStatistics;
-use crate::error::{Error, Result};
-use rigid_pose::{absolute_orientation, absolute_orientation_with_scale};
+use crate::error::Result;
+use rigid_pose::{InputError, absolute_orientation, absolute_orientation_with_scale};
 
 /// How an estimate is moved onto the truth before they are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -87,8 +87,8 @@ impl AbsoluteTrajectoryError {
 /// Poses are matched by time and aligned as the options say. Follows `[Sturm2012]`.
 ///
 /// # Errors
-/// [`Error::NoCommonTime`]; [`Error::TooFewPoints`] and [`Error::Pose`] where the common positions do not determine
-/// the alignment; [`Error::Empty`], [`Error::NonFinite`], [`Error::InvalidOption`] for the input.
+/// [`crate::Error::NoCommonTime`]; [`InputError::TooFewPoints`] and [`InputError::Collinear`] where the common positions do not determine
+/// the alignment; [`InputError::Empty`], [`InputError::NonFinite`], [`InputError::InvalidOption`] for the input.
 pub fn absolute_trajectory_error(
     estimate: &[Stamped],
     truth: &[Stamped],
@@ -116,7 +116,8 @@ pub fn absolute_trajectory_error(
         .collect();
     let position_m = ErrorStatistics::of(matched.iter().map(|pose| pose.position_error_m));
     let attitude_rad = ErrorStatistics::of(matched.iter().map(|pose| pose.attitude_error_rad));
-    let (position_m, attitude_rad) = position_m.zip(attitude_rad).ok_or(Error::Empty { what: "the matched poses" })?;
+    let (position_m, attitude_rad) =
+        position_m.zip(attitude_rad).ok_or(InputError::Empty { what: "the matched poses" })?;
     Ok(AbsoluteTrajectoryError { truth_from_estimate, scale, matched, position_m, attitude_rad })
 }
 

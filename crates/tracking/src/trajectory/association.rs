@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use crate::error::{Error, Result};
-use rigid_pose::is_finite;
+use rigid_pose::{InputError, is_finite, require_option};
 
 pub(super) type Stamped = (f64, Isometry3<f64>);
 
@@ -13,13 +13,8 @@ pub(super) type Stamped = (f64, Isometry3<f64>);
 pub(super) fn associate(estimate: &[Stamped], truth: &[Stamped], tolerance_s: f64) -> Result<Vec<(usize, usize)>> {
     check("the estimated trajectory", estimate)?;
     check("the true trajectory", truth)?;
-    if !(tolerance_s >= 0.0 && tolerance_s.is_finite()) {
-        return Err(Error::InvalidOption {
-            name: "max_time_difference_s",
-            value: tolerance_s,
-            domain: "0 or more and finite",
-        });
-    }
+    let is_inside = |tolerance: f64| tolerance >= 0.0 && tolerance.is_finite();
+    require_option("max_time_difference_s", tolerance_s, "0 or more and finite", is_inside)?;
     let (of_estimate, of_truth) = (by_time(estimate), by_time(truth));
     let mut candidates: Vec<(f64, usize, usize)> = Vec::new();
     for (rank, &index) in of_estimate.iter().enumerate() {
@@ -55,10 +50,10 @@ pub(super) fn associate(estimate: &[Stamped], truth: &[Stamped], tolerance_s: f6
 
 fn check(what: &'static str, poses: &[Stamped]) -> Result<()> {
     if poses.is_empty() {
-        return Err(Error::Empty { what });
+        return Err(InputError::Empty { what }.into());
     }
     match poses.iter().position(|(time, pose)| !(time.is_finite() && is_finite(pose))) {
-        Some(index) => Err(Error::NonFinite { what, index }),
+        Some(index) => Err(InputError::NonFinite { what, index }.into()),
         None => Ok(()),
     }
 }

@@ -1,7 +1,8 @@
 use super::absolute::TrajectoryErrorOptions;
 use super::association::{Stamped, associate};
 use super::statistics::ErrorStatistics;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use rigid_pose::{InputError, require_option, require_positive};
 
 /// Over how long a step drift is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,8 +57,8 @@ impl RelativePoseError {
 /// it misses by more than the tolerance. Follows `[Sturm2012]`.
 ///
 /// # Errors
-/// [`Error::NoCommonTime`], [`Error::TooFewPoints`] where there is no such step; [`Error::Empty`], [`Error::NonFinite`],
-/// [`Error::InvalidOption`] for the input.
+/// [`crate::Error::NoCommonTime`], [`InputError::TooFewPoints`] where there is no such step; [`InputError::Empty`], [`InputError::NonFinite`],
+/// [`InputError::InvalidOption`] for the input.
 pub fn relative_pose_error(
     estimate: &[Stamped],
     truth: &[Stamped],
@@ -96,7 +97,7 @@ pub fn relative_pose_error(
     let steps: Vec<RelativeError> = steps.collect();
     let translation_m = ErrorStatistics::of(steps.iter().map(|step| step.translation_error_m));
     let rotation_rad = ErrorStatistics::of(steps.iter().map(|step| step.rotation_error_rad));
-    let too_few = Error::TooFewPoints { what: "relative pose error: steps of the length", found: 0, needed: 1 };
+    let too_few = InputError::TooFewPoints { what: "relative pose error: steps of the length", found: 0, needed: 1 };
     let (translation_m, rotation_rad) = translation_m.zip(rotation_rad).ok_or(too_few)?;
     Ok(RelativePoseError { steps, translation_m, rotation_rad })
 }
@@ -106,13 +107,9 @@ fn check(step: RelativeStep, tolerance: f64) -> Result<()> {
         RelativeStep::Frames(frames) => frames as f64,
         RelativeStep::Seconds(length) | RelativeStep::Metres(length) => length,
     };
-    if !(length > 0.0 && length.is_finite()) {
-        return Err(Error::InvalidOption { name: "step", value: length, domain: "positive and finite" });
-    }
-    if !(tolerance >= 0.0 && tolerance.is_finite()) {
-        return Err(Error::InvalidOption { name: "step_tolerance", value: tolerance, domain: "0 or more and finite" });
-    }
-    Ok(())
+    require_positive("step", length)?;
+    let is_inside = |tolerance: f64| tolerance >= 0.0 && tolerance.is_finite();
+    Ok(require_option("step_tolerance", tolerance, "0 or more and finite", is_inside)?)
 }
 
 /// The index behind `first` whose value, in a list that does not fall, is nearest to that of `first` plus `step`.

@@ -11,10 +11,10 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::description::features::Features;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use describe::{descriptor, orientations};
 use extrema::{Keypoint, extrema};
-use point_cloud::is_usable;
+use rigid_pose::{InputError, is_usable, require_count, require_length, require_positive};
 use scale_space::{Image, ScaleSpace};
 
 /// Options of [`amplitude_features`].
@@ -36,15 +36,9 @@ impl Default for AmplitudeFeatureOptions {
 
 impl AmplitudeFeatureOptions {
     fn validate(&self) -> Result<()> {
-        for (name, value) in [("min_contrast", self.min_contrast), ("max_edge_ratio", self.max_edge_ratio)] {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
-            }
-        }
-        if self.max_features == 0 {
-            return Err(Error::InvalidOption { name: "max_features", value: 0.0, domain: "1 or more" });
-        }
-        Ok(())
+        require_positive("min_contrast", self.min_contrast)?;
+        require_positive("max_edge_ratio", self.max_edge_ratio)?;
+        Ok(require_count("max_features", self.max_features, 1)?)
     }
 }
 
@@ -55,7 +49,7 @@ impl AmplitudeFeatureOptions {
 /// feature. The descriptors have 128 values.
 ///
 /// # Errors
-/// [`Error::LengthMismatch`] where a plane does not fill the frame, [`Error::InvalidOption`], [`Error::TooFewPoints`]
+/// [`InputError::LengthMismatch`] where a plane does not fill the frame, [`InputError::InvalidOption`], [`InputError::TooFewPoints`]
 /// for frames under 16 pixels or without a usable pixel.
 pub fn amplitude_features(
     amplitude: &[f32],
@@ -66,13 +60,10 @@ pub fn amplitude_features(
 ) -> Result<Features> {
     options.validate()?;
     let expected = width.saturating_mul(height);
-    for (what, found) in [("amplitude", amplitude.len()), ("points of the frame", points.len())] {
-        if found != expected {
-            return Err(Error::LengthMismatch { what, expected, found });
-        }
-    }
+    require_length("amplitude", expected, amplitude.len())?;
+    require_length("points of the frame", expected, points.len())?;
     if width < 16 || height < 16 {
-        return Err(Error::TooFewPoints { what: "edge of the frame", found: width.min(height), needed: 16 });
+        return Err(InputError::TooFewPoints { what: "edge of the frame", found: width.min(height), needed: 16 }.into());
     }
     let space = ScaleSpace::new(&reflectance(amplitude, points, width, height)?);
     let mut keypoints = extrema(&space, options.min_contrast as f32, options.max_edge_ratio as f32);
@@ -103,7 +94,7 @@ fn reflectance(amplitude: &[f32], points: &[[f64; 3]], width: usize, height: usi
     };
     let first = (0..amplitude.len()).find_map(value);
     let Some(mut last) = first else {
-        return Err(Error::TooFewPoints { what: "pixels with amplitude and range", found: 0, needed: 1 });
+        return Err(InputError::TooFewPoints { what: "pixels with amplitude and range", found: 0, needed: 1 }.into());
     };
     let values = (0..amplitude.len()).map(|i| {
         last = value(i).unwrap_or(last);

@@ -6,15 +6,16 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
+use rigid_pose::InputError;
 use statistics::upper_median;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::icp::engine::matching::Points;
 use crate::icp::engine::registration::{Engine, Track, length};
 use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, KernelSchedule, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
 use crate::system::System;
-use point_cloud::is_usable;
+use rigid_pose::is_usable;
 
 /// Points whose distance at the guess is looked at.
 const GUESS_SAMPLES: usize = 1000;
@@ -80,7 +81,7 @@ fn median_distance(engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f6
     let distance = |&source: &usize| -> Result<Option<f64>> {
         let moved = guess * scene.source.points[source];
         if !is_usable(&moved) {
-            return Err(Error::NonFinite { what: "source points in the target frame", index: source });
+            return Err(InputError::NonFinite { what: "source points in the target frame", index: source }.into());
         }
         let normal = guess.rotation * scene.source_normals[source];
         let query = Query { source, moved: moved.coords, normal, pose: *guess, limit_m: NO_LIMIT_M, remember: false };
@@ -133,7 +134,9 @@ fn best_of(tracks: Vec<Result<(f64, Track)>>) -> Result<(f64, Track)> {
             (before, _) => before,
         };
     }
-    best.unwrap_or(Err(Error::Numerical { what: "the coarse registration", why: "there was nothing to try" }))
+    best.unwrap_or(Err(
+        InputError::Numerical { what: "the coarse registration", why: "there was nothing to try" }.into()
+    ))
 }
 
 impl<'p> Engine<'p> {

@@ -2,12 +2,13 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
+use rigid_pose::InputError;
 
 use crate::error::{Error, Result};
 use crate::icp::engine::registration::Engine;
 use crate::parts::{Moment, Pair, Partner, Query, Scene};
 use point_cloud::Cloud;
-use point_cloud::is_usable;
+use rigid_pose::is_usable;
 
 /// Points handled together by one thread; fixed, so that sums do not depend on the number of threads.
 pub(crate) const CHUNK: usize = 1024;
@@ -112,7 +113,7 @@ impl Engine<'_> {
         let (found, of, needed) = (pairs.len(), points.indices.len(), self.parts.min_correspondences);
         if found < needed {
             let (max_distance_m, iteration) = (scene.moment.limit_m, iterations);
-            return Err(Error::TooFewCorrespondences { found, of, needed, max_distance_m, iteration });
+            return Err(InputError::TooFewCorrespondences { found, of, needed, max_distance_m, iteration }.into());
         }
         Ok(pairs)
     }
@@ -123,7 +124,7 @@ impl Engine<'_> {
         let pose = scene.moment.pose;
         let moved = pose * scene.source.points[source];
         if !is_usable(&moved) {
-            return Err(Error::NonFinite { what: "source points in the target frame", index: source });
+            return Err(InputError::NonFinite { what: "source points in the target frame", index: source }.into());
         }
         let moved = moved.coords;
         let turned = pose.rotation * scene.source_normals[source];

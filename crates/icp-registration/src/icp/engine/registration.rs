@@ -21,7 +21,7 @@ use crate::system::System;
 use crate::target::IcpTarget;
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
-use rigid_pose::is_finite;
+use rigid_pose::{InputError, require_pose};
 
 /// An ICP registration of which every part can be replaced: the stages of `[RusinkiewiczLevoy2001]`.
 ///
@@ -96,8 +96,8 @@ impl<'a> Registration<'a> {
     /// a source without any are estimated.
     ///
     /// # Errors
-    /// [`Error::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`Error::Empty`],
-    /// [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::NotPositive`], [`Error::InvalidOption`],
+    /// [`InputError::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`InputError::Empty`],
+    /// [`InputError::NonFinite`], [`InputError::LengthMismatch`], [`InputError::NotPositive`], [`InputError::InvalidOption`],
     /// [`Error::Incompatible`] for the input and the parts.
     pub fn align(&self, source: &Cloud, guess: &Isometry3<f64>) -> Result<IcpResult> {
         source.validate("the source cloud")?;
@@ -148,9 +148,7 @@ impl<'p> Engine<'p> {
         source_normals: &'p [Vector3<f64>],
         guess: &Isometry3<f64>,
     ) -> Result<Self> {
-        if !is_finite(guess) {
-            return Err(Error::NonFinite { what: "the guess", index: 0 });
-        }
+        require_pose("the guess", guess)?;
         let target = parts.matching.target();
         let moment = Moment { pose: *guess, limit_m: f64::INFINITY, level: 0, levels: 1, iteration: 0, ended: false };
         let with_normal = source_normals.iter().filter(|n| !n.x.is_nan()).count();
@@ -202,7 +200,7 @@ impl<'p> Engine<'p> {
             step /= excess;
         }
         if !step.iter().all(|v| v.is_finite()) {
-            return Err(Error::Numerical { what: "a step of the registration", why: "it is not finite" });
+            return Err(InputError::Numerical { what: "a step of the registration", why: "it is not finite" }.into());
         }
         track.pose = system.moved(&step);
         track.iterations += 1;

@@ -1,10 +1,11 @@
 //! The nearest point of a cloud whose normal agrees.
 
+use rigid_pose::{require_count, require_positive};
+
 use super::nearest::partner_at;
 use super::{Partner, PointMatching, Query};
 use crate::error::Result;
 use crate::parts::scene::TargetSurface;
-use crate::parts::{require_count, require_positive};
 use crate::target::IcpTarget;
 
 /// The nearest of the k nearest points whose normal encloses less than an angle with that of the source point
@@ -45,6 +46,6 @@ impl PointMatching for CompatibleNearest<'_> {
 
     fn validate(&self) -> Result<()> {
         require_count("neighbours", self.neighbours, 1)?;
-        require_positive("max_angle_rad", self.max_angle_rad)
+        Ok(require_positive("max_angle_rad", self.max_angle_rad)?)
     }
 }

@@ -1,10 +1,11 @@
 //! The point of an organised frame at the pixel that a source point falls on.
 
 use nalgebra::Point3;
+use rigid_pose::{is_usable, require_length};
 
 use super::nearest::partner_at;
 use super::{Partner, PointMatching, Query};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::parts::scene::TargetSurface;
 use crate::target::IcpTarget;
 
@@ -30,7 +31,7 @@ impl<'a> Projective<'a> {
     /// `pixel`: projection of a point of the target's frame to `(col, row)`.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] where frame, size and target do not belong together.
+    /// [`InputError::LengthMismatch`](rigid_pose::InputError::LengthMismatch) where frame, size and target do not belong together.
     pub fn new(
         target: &'a IcpTarget,
         points: &[[f64; 3]],
@@ -39,22 +40,17 @@ impl<'a> Projective<'a> {
         pixel: impl Fn(&Point3<f64>) -> Option<[f64; 2]> + Sync + 'a,
     ) -> Result<Self> {
         let expected = width.saturating_mul(height);
-        if points.len() != expected {
-            return Err(Error::LengthMismatch { what: "points of the frame", expected, found: points.len() });
-        }
+        require_length("points of the frame", expected, points.len())?;
         let mut count = 0;
         let point_of_pixel: Vec<Option<usize>> = points
             .iter()
             .map(|p| {
-                let usable = point_cloud::is_usable(&Point3::from(*p));
+                let usable = is_usable(&Point3::from(*p));
                 count += usize::from(usable);
                 usable.then(|| count - 1)
             })
             .collect();
-        if count != target.cloud.len() {
-            let (expected, found) = (target.cloud.len(), count);
-            return Err(Error::LengthMismatch { what: "points of the frame with a range", expected, found });
-        }
+        require_length("points of the frame with a range", target.cloud.len(), count)?;
         Ok(Self { target, point_of_pixel, width, height, pixel: Box::new(pixel) })
     }
 

@@ -3,10 +3,11 @@
 mod bridge;
 
 use nalgebra::{Point3, Vector3};
+use rigid_pose::InputError;
 
 use crate::error::{Error, Result};
 use crate::parts::{Partner, PointMatching, Query, TargetSurface};
-use point_cloud::check_points;
+use rigid_pose::require_points;
 
 /// Triangles with a search tree over them, metre.
 pub struct TriangleMesh {
@@ -25,10 +26,10 @@ impl TriangleMesh {
     /// Builds the tree. `triangles`: indices of three vertices each; triangles without an area are left out.
     ///
     /// # Errors
-    /// [`Error::Empty`] where no triangle with an area is left, [`Error::NonFinite`] for a vertex,
+    /// [`InputError::Empty`] where no triangle with an area is left, [`InputError::NonFinite`] for a vertex,
     /// [`Error::NoSuchVertex`].
     pub fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Result<Self> {
-        check_points("vertex of the mesh", vertices)?;
+        require_points("vertex of the mesh", vertices)?;
         let count = vertices.len();
         let out_of_range = |triangle: &&[u32; 3]| triangle.iter().any(|&v| v as usize >= count);
         if let Some(triangle) = triangles.iter().find(out_of_range) {
@@ -49,7 +50,7 @@ impl TriangleMesh {
             }
         }
         if kept.is_empty() {
-            return Err(Error::Empty { what: "the mesh (of triangles with an area)" });
+            return Err(InputError::Empty { what: "the mesh (of triangles with an area)" }.into());
         }
         let radius_m = radius(vertices, &kept, &areas);
         Ok(Self { tree: bridge::Tree::new(vertices, kept)?, normals, radius_m })
@@ -74,9 +75,9 @@ impl TriangleMesh {
     /// the vertices run counter-clockwise).
     ///
     /// # Errors
-    /// [`Error::NonFinite`] for a query that is not finite.
+    /// [`InputError::NonFinite`] for a query that is not finite.
     pub fn closest(&self, query: &Point3<f64>, limit_m: f64) -> Result<Option<(Point3<f64>, Vector3<f64>)>> {
-        check_points("query point", std::slice::from_ref(query))?;
+        require_points("query point", std::slice::from_ref(query))?;
         Ok(self.tree.closest(query, limit_m).map(|(triangle, point)| (point, self.normals[triangle])))
     }
 }

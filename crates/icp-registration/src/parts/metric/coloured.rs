@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
+use rigid_pose::{InputError, require_length};
 
 use super::{ErrorMetric, Row, Rows, normal_twins};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::parts::scene::{Pair, Scene};
 use crate::target::IcpTarget;
 use point_cloud::Cloud;
@@ -29,7 +30,7 @@ impl Coloured {
     /// Fits the gradients of both clouds. Normals of the source are estimated where there are none.
     ///
     /// # Errors
-    /// [`Error::Empty`] where a cloud has no points or no intensity, [`Error::NonFinite`], [`Error::LengthMismatch`].
+    /// [`InputError::Empty`] where a cloud has no points or no intensity, [`InputError::NonFinite`], [`InputError::LengthMismatch`].
     pub fn new(source: &Cloud, target: &IcpTarget) -> Result<Self> {
         source.validate("the source cloud")?;
         let tree = NeighbourTree::new(&source.points)?;
@@ -90,15 +91,8 @@ impl ErrorMetric for Coloured {
 
     fn validate(&self, scene: &Scene<'_>) -> Result<()> {
         let target = scene.target.cloud.map_or(0, Cloud::len);
-        for (what, expected, found) in [
-            ("intensity gradients of the source", scene.source.len(), self.source.len()),
-            ("intensity gradients of the target", target, self.target.len()),
-        ] {
-            if found != expected {
-                return Err(Error::LengthMismatch { what, expected, found });
-            }
-        }
-        Ok(())
+        require_length("intensity gradients of the source", scene.source.len(), self.source.len())?;
+        Ok(require_length("intensity gradients of the target", target, self.target.len())?)
     }
 }
 
@@ -109,7 +103,7 @@ fn gradients(
     tree: &NeighbourTree,
     what: &'static str,
 ) -> Result<Vec<Vector3<f64>>> {
-    let Some(intensity) = &cloud.intensity else { return Err(Error::Empty { what }) };
+    let Some(intensity) = &cloud.intensity else { return Err(InputError::Empty { what }.into()) };
     let gradient = |i: usize| -> Result<Vector3<f64>> {
         let neighbours = tree.k_nearest(&cloud.points[i], NEIGHBOURS)?;
         let about = neighbours.iter().map(|n| (cloud.points[n.index] - cloud.points[i], intensity[n.index]));

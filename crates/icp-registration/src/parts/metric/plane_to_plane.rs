@@ -1,10 +1,10 @@
 //! Distance of two small disks.
 
 use nalgebra::Vector3;
+use rigid_pose::require_positive;
 
 use super::{ErrorMetric, Row, Rows};
 use crate::error::Result;
-use crate::parts::require_positive;
 use crate::parts::scene::{Pair, Scene};
 
 /// Generalised ICP `[Segal2009]`: `2ε (m − q)ᵀ (C_q + R C_p Rᵀ)⁻¹ (m − q)`, where each point is a disk with covariance
@@ -72,7 +72,7 @@ impl ErrorMetric for PlaneToPlane {
     }
 
     fn validate(&self, _: &Scene<'_>) -> Result<()> {
-        require_positive("flatness", self.flatness)
+        Ok(require_positive("flatness", self.flatness)?)
     }
 }
 

@@ -4,10 +4,10 @@ use nalgebra::Vector6;
 
 use super::Minimiser;
 use crate::error::Result;
+use crate::parts::ErrorMetric;
 use crate::parts::scene::Scene;
-use crate::parts::{ErrorMetric, require_count};
 use crate::system::System;
-use rigid_pose::free_of;
+use rigid_pose::{free_of, require_count};
 
 /// Damping at the first step, and the factor with which it falls and rises.
 const FIRST_DAMPING: f64 = 1e-6;
@@ -59,6 +59,6 @@ impl Minimiser for LevenbergMarquardt {
     }
 
     fn validate(&self, _: &Scene<'_>, _: &dyn ErrorMetric) -> Result<()> {
-        require_count("inner_iterations", self.inner_iterations, 1)
+        Ok(require_count("inner_iterations", self.inner_iterations, 1)?)
     }
 }

@@ -6,7 +6,8 @@ mod rim;
 pub use quantiles::{MedianDistance, Trimmed};
 pub use rim::{MutualNearest, SourceRim, TargetRim};
 
-use super::require_positive;
+use rigid_pose::require_positive;
+
 use super::scene::{Pair, Scene};
 use crate::error::Result;
 
@@ -36,7 +37,7 @@ impl PairRejection for MaxDistance {
     }
 
     fn validate(&self, _: &Scene<'_>) -> Result<()> {
-        require_positive("max_distance_m", self.0)
+        Ok(require_positive("max_distance_m", self.0)?)
     }
 }
 
@@ -52,6 +53,6 @@ impl PairRejection for MaxNormalAngle {
     }
 
     fn validate(&self, _: &Scene<'_>) -> Result<()> {
-        require_positive("max_normal_angle_rad", self.0)
+        Ok(require_positive("max_normal_angle_rad", self.0)?)
     }
 }

@@ -1,10 +1,10 @@
 //! Pairs that are too far apart compared with the others.
 
+use rigid_pose::{require_option, require_positive};
 use statistics::ranked;
 
 use super::PairRejection;
-use crate::error::{Error, Result};
-use crate::parts::require_positive;
+use crate::error::Result;
 use crate::parts::scene::{Pair, Scene};
 
 /// Keeps this fraction of the pairs, those with the smallest distances `[Chetverikov2002]`.
@@ -19,10 +19,7 @@ impl PairRejection for Trimmed {
     }
 
     fn validate(&self, _: &Scene<'_>) -> Result<()> {
-        if self.0 > 0.0 && self.0 <= 1.0 {
-            return Ok(());
-        }
-        Err(Error::InvalidOption { name: "trim", value: self.0, domain: "above 0 and at most 1" })
+        Ok(require_option("trim", self.0, "above 0 and at most 1", |share| share > 0.0 && share <= 1.0)?)
     }
 }
 
@@ -36,7 +33,7 @@ impl PairRejection for MedianDistance {
     }
 
     fn validate(&self, _: &Scene<'_>) -> Result<()> {
-        require_positive("median_multiple", self.0)
+        Ok(require_positive("median_multiple", self.0)?)
     }
 }
 

@@ -3,10 +3,11 @@
 use nalgebra::Point3;
 
 use super::PairRejection;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::parts::scene::{Pair, Scene};
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
+use rigid_pose::{require_length, require_option};
 
 /// Pairs whose target point lies at the rim of what was seen, or mixes two surfaces ([`Cloud::rim`]) `[TurkLevoy1994]`:
 /// points beyond the edge of the target all find their partner on the edge and pull the clouds together.
@@ -46,7 +47,7 @@ impl MutualNearest {
     /// For a registration of `source`.
     ///
     /// # Errors
-    /// [`Error::Empty`], [`Error::NonFinite`] for its points.
+    /// [`InputError::Empty`], [`InputError::NonFinite`] for its points.
     pub fn new(source: &Cloud, tolerance_m: f64) -> Result<Self> {
         Ok(Self { tree: NeighbourTree::new(&source.points)?, points: source.points.clone(), tolerance_m })
     }
@@ -61,13 +62,8 @@ impl PairRejection for MutualNearest {
     }
 
     fn validate(&self, scene: &Scene<'_>) -> Result<()> {
-        if self.points.len() != scene.source.len() {
-            let (expected, found) = (scene.source.len(), self.points.len());
-            return Err(Error::LengthMismatch { what: "the source cloud of the mutual neighbours", expected, found });
-        }
-        if self.tolerance_m >= 0.0 && self.tolerance_m.is_finite() {
-            return Ok(());
-        }
-        Err(Error::InvalidOption { name: "tolerance_m", value: self.tolerance_m, domain: "0 or more and finite" })
+        require_length("the source cloud of the mutual neighbours", scene.source.len(), self.points.len())?;
+        let is_inside = |tolerance: f64| tolerance >= 0.0 && tolerance.is_finite();
+        Ok(require_option("tolerance_m", self.tolerance_m, "0 or more and finite", is_inside)?)
     }
 }

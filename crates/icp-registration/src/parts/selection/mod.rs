@@ -6,7 +6,8 @@ mod stability;
 pub use normal_space::NormalSpace;
 pub use stability::Stability;
 
-use super::require_count;
+use rigid_pose::require_count;
+
 use super::scene::Scene;
 use crate::error::Result;
 

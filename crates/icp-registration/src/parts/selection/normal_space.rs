@@ -1,10 +1,10 @@
 //! Selection evenly over the directions of the normals.
 
 use nalgebra::Vector3;
+use rigid_pose::require_count;
 
 use super::PointSelection;
 use crate::error::Result;
-use crate::parts::require_count;
 use crate::parts::scene::Scene;
 
 /// About this many points, spread evenly over the directions of their normals `[RusinkiewiczLevoy2001]`: what few points

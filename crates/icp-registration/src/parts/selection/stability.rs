@@ -4,10 +4,8 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::PointSelection;
 use crate::error::Result;
-use crate::parts::require_count;
 use crate::parts::scene::Scene;
-use rigid_pose::eigen6;
-use rigid_pose::symmetrised;
+use rigid_pose::{eigen6, require_count, symmetrised};
 
 /// Share of the best held motion below which a motion is held by rounding only.
 const UNHELD: f64 = 1e-9;

@@ -1,5 +1,6 @@
 //! Weight from the similarity of intensities.
 
+use rigid_pose::require_positive;
 use statistics::mad_scale;
 
 use super::PairWeighting;
@@ -40,6 +41,6 @@ impl PairWeighting for IntensityWeight {
     }
 
     fn validate(&self) -> crate::error::Result<()> {
-        crate::parts::require_positive("width", self.width)
+        Ok(require_positive("width", self.width)?)
     }
 }

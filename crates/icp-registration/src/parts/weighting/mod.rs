@@ -6,7 +6,8 @@ mod sigma;
 pub use intensity::IntensityWeight;
 pub use sigma::SigmaWeight;
 
-use super::require_positive;
+use rigid_pose::require_positive;
+
 use super::scene::{Pair, Scene};
 use crate::error::Result;
 
@@ -64,6 +65,6 @@ impl PairWeighting for NormalWeight {
     }
 
     fn validate(&self) -> Result<()> {
-        require_positive("power", self.power)
+        Ok(require_positive("power", self.power)?)
     }
 }

@@ -63,8 +63,9 @@ impl FreeSpace {
     }
 }
 
-/// The least of each cell and those about it; zero where it is not known itself.
-fn least_around(cells: &[f32], edge: usize) -> Vec<f32> {
+/// The least of each cell of a face and those about it, for beside a jump of the range nothing is certain; zero where it is not
+/// known itself.
+pub(crate) fn least_around(cells: &[f32], edge: usize) -> Vec<f32> {
     let least = |(cell, own): (usize, &f32)| {
         if own.is_infinite() {
             return 0.0;

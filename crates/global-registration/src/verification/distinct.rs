@@ -179,9 +179,7 @@ impl Planes {
         let count = on.len().max(1) as f64;
         let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
         let place = |i: usize| wide(cloud.reduced.points[i]);
-        let centre = on.iter().fold(Vector3::zeros(), |sum, &[_, i]| sum + place(i)) / count;
-        let spread: f64 = on.iter().map(|&[_, i]| (place(i) - centre).norm_squared()).sum();
-        let frame = Centred { centre, radius_m: (spread / count).sqrt().max(cloud.voxel_m()) };
+        let frame = Centred::about(on.iter().map(|&[_, i]| place(i)), cloud.voxel_m());
         let motion = Motion::new(pose);
         let mut residuals = Vec::new();
         for _ in 0..MOST_PLANES {

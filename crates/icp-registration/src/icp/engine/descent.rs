@@ -6,21 +6,18 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
-use rigid_pose::InputError;
+use rigid_pose::{InputError, is_usable, motion_length};
 use statistics::upper_median;
 
 use crate::error::Result;
 use crate::icp::engine::matching::Points;
-use crate::icp::engine::registration::{Engine, Track, length};
+use crate::icp::engine::registration::{Engine, Track};
 use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, KernelSchedule, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
 use crate::system::System;
-use rigid_pose::is_usable;
 
 /// Points whose distance at the guess is looked at.
 const GUESS_SAMPLES: usize = 1000;
-/// A limit that no distance reaches, and whose square is finite.
-const NO_LIMIT_M: f64 = 1e120;
 
 /// Distance limits from coarse to fine: the last one doubled up to the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,8 +80,8 @@ fn median_distance(engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f6
         if !is_usable(&moved) {
             return Err(InputError::NonFinite { what: "source points in the target frame", index: source }.into());
         }
-        let normal = guess.rotation * scene.source_normals[source];
-        let query = Query { source, moved: moved.coords, normal, pose: *guess, limit_m: NO_LIMIT_M, remember: false };
+        let (normal, limit_m) = (guess.rotation * scene.source_normals[source], f64::INFINITY);
+        let query = Query { source, moved: moved.coords, normal, pose: *guess, limit_m, remember: false };
         let partner = engine.parts.matching.partner(&query);
         Ok(partner.found.then(|| (partner.point - query.moved).norm()))
     };
@@ -102,14 +99,13 @@ pub struct Alternative<'a> {
     pub rejection: Vec<Box<dyn PairRejection + 'a>>,
 }
 
-impl<'a> Alternative<'a> {
+impl Alternative<'_> {
     /// Free normals; compatible normals; and these by least squares. `trim`: fraction of the pairs to keep.
     pub fn usual(kernel: RobustKernel, max_normal_angle_rad: Option<f64>, trim: Option<f64>) -> Vec<Self> {
-        let with = |kernel: RobustKernel, angle: Option<f64>| {
-            let mut rejection: Vec<Box<dyn PairRejection + 'a>> = Vec::new();
-            rejection.extend(angle.map(|angle| Box::new(MaxNormalAngle(angle)) as Box<dyn PairRejection>));
-            rejection.extend(trim.map(|trim| Box::new(Trimmed(trim)) as Box<dyn PairRejection>));
-            Self { metric: None, kernel: Box::new(kernel), rejection }
+        let with = |kernel: RobustKernel, angle: Option<f64>| Self {
+            metric: None,
+            kernel: Box::new(kernel),
+            rejection: rejections(angle, trim),
         };
         let mut alternatives = vec![with(kernel, None)];
         if max_normal_angle_rad.is_some() {
@@ -118,6 +114,12 @@ impl<'a> Alternative<'a> {
         }
         alternatives
     }
+}
+
+/// The rejections by the angle between normals, radian, and down to a fraction of the pairs, where they are given.
+pub(in crate::icp) fn rejections<'a>(angle: Option<f64>, trim: Option<f64>) -> Vec<Box<dyn PairRejection + 'a>> {
+    let by_angle = angle.map(|angle| Box::new(MaxNormalAngle(angle)) as Box<dyn PairRejection>);
+    by_angle.into_iter().chain(trim.map(|trim| Box::new(Trimmed(trim)) as Box<dyn PairRejection>)).collect()
 }
 
 /// Fraction of the distance limit at which a residual counts half in the comparison of tracks.
@@ -204,7 +206,7 @@ impl<'p> Engine<'p> {
                 }
                 let moment = track.moment(limits, level, iteration);
                 let step = self.step(&mut track, &moment, &mut points)?;
-                if length(&step) < self.parts.levels.step_fraction * limits[level] {
+                if motion_length(&step) < self.parts.levels.step_fraction * limits[level] {
                     break;
                 }
             }

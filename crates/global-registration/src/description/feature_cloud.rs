@@ -18,7 +18,7 @@ use crate::error::Result;
 use point_cloud::Cloud;
 
 /// Fewest averaged points.
-const LEAST_POINTS: usize = 10;
+pub(crate) const LEAST_POINTS: usize = 10;
 /// Points that a pose is judged by.
 const SAMPLES: usize = 1500;
 

@@ -127,18 +127,16 @@ const FIT_RESIDUAL: f64 = 1.0 / 12.0;
 
 /// The first track with the best fit, or the first error.
 fn best_of(tracks: Vec<Result<(f64, Track)>>) -> Result<(f64, Track)> {
-    let mut best: Option<Result<(f64, Track)>> = None;
-    for track in tracks {
-        best = match (best, track) {
-            (None, track) => Some(track),
-            (Some(Ok(before)), Ok(track)) if track.0 > before.0 => Some(Ok(track)),
-            (Some(Err(_)), Ok(track)) => Some(Ok(track)),
-            (before, _) => before,
-        };
+    let better = |before, track| match (&before, &track) {
+        (Ok((least, _)), Ok((fit, _))) if fit > least => track,
+        (Err(_), Ok(_)) => track,
+        _ => before,
+    };
+    tracks.into_iter().reduce(better).unwrap_or(Err(InputError::Numerical {
+        what: "the coarse registration",
+        why: "there was nothing to try",
     }
-    best.unwrap_or(Err(
-        InputError::Numerical { what: "the coarse registration", why: "there was nothing to try" }.into()
-    ))
+    .into()))
 }
 
 impl<'p> Engine<'p> {
@@ -172,8 +170,8 @@ impl<'p> Engine<'p> {
     /// first.
     fn tracks(&self, sample: &[usize], starts: &[Isometry3<f64>], limits: &[f64]) -> Vec<Result<(f64, Track)>> {
         let alternatives: Vec<Engine<'_>> = match self.parts.alternatives.as_slice() {
-            [] => vec![self.with(None)],
-            some => some.iter().map(|alternative| self.with(Some(alternative))).collect(),
+            [] => vec![*self],
+            some => some.iter().map(|alternative| self.with(alternative)).collect(),
         };
         let ways: Vec<(&Isometry3<f64>, &Engine<'_>)> =
             starts.iter().flat_map(|start| alternatives.iter().map(move |engine| (start, engine))).collect();
@@ -184,16 +182,9 @@ impl<'p> Engine<'p> {
         ways.par_iter().map(run).collect()
     }
 
-    fn with(&self, alternative: Option<&'p Alternative<'p>>) -> Engine<'p> {
-        let (parts, scene) = (self.parts, self.scene);
-        let own = Engine { parts, scene, metric: self.metric, rejection: self.rejection, kernel: self.kernel };
-        alternative.map_or(own, |alternative| Engine {
-            parts,
-            scene,
-            metric: alternative.metric.as_deref().unwrap_or(self.metric),
-            rejection: &alternative.rejection,
-            kernel: &*alternative.kernel,
-        })
+    fn with(&self, alternative: &'p Alternative<'p>) -> Engine<'p> {
+        let metric = alternative.metric.as_deref().unwrap_or(self.metric);
+        Engine { metric, rejection: &alternative.rejection, kernel: &*alternative.kernel, ..*self }
     }
 
     fn down(&self, sample: &[usize], guess: &Isometry3<f64>, limits: &[f64]) -> Result<Track> {

@@ -98,6 +98,7 @@ impl<'a> Registration<'a> {
 }
 
 /// The parts at work on two surfaces.
+#[derive(Clone, Copy)]
 pub(crate) struct Engine<'p> {
     pub parts: &'p Registration<'p>,
     pub scene: Scene<'p>,

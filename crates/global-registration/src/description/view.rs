@@ -1,7 +1,6 @@
 //! What was seen from the viewpoint: ranges by direction on the six faces of a cube.
 
 use crate::description::fpfh::{dot, subtract};
-use crate::verification::free_space::least_around;
 
 /// Most cells along the edge of a face.
 const MOST: f32 = 256.0;
@@ -99,6 +98,21 @@ impl View {
         let (u, v) = (place(d[(axis + 1) % 3]).min(self.edge - 1), place(d[(axis + 2) % 3]).min(self.edge - 1));
         Some(((face * self.edge + v) * self.edge + u, length(d)))
     }
+}
+
+/// The least of each cell of a face and those about it, for beside a jump of the range nothing is certain; zero where it is not
+/// known itself.
+pub(crate) fn least_around(cells: &[f32], edge: usize) -> Vec<f32> {
+    let least = |(cell, own): (usize, &f32)| {
+        if own.is_infinite() {
+            return 0.0;
+        }
+        let (u, v) = (cell % edge, cell / edge);
+        let rows = v.saturating_sub(1)..=(v + 1).min(edge - 1);
+        let columns = u.saturating_sub(1)..=(u + 1).min(edge - 1);
+        rows.flat_map(|row| columns.clone().map(move |column| cells[row * edge + column])).fold(*own, f32::min)
+    };
+    cells.iter().enumerate().map(least).collect()
 }
 
 fn length(d: [f32; 3]) -> f32 {

@@ -36,7 +36,7 @@ impl VoxelCloud {
     ///
     /// # Errors
     /// [`InputError::Empty`], [`InputError::NonFinite`], [`InputError::LengthMismatch`], [`InputError::NotPositive`] for the cloud;
-    /// [`Error::VoxelSize`] for a size that is not positive, or of which more than two million lie along the cloud.
+    /// [`Error::VoxelSize`](crate::Error::VoxelSize) for a size that is not positive, or of which more than two million lie along the cloud.
     pub fn new(cloud: &Cloud, voxel_m: Option<f64>) -> Result<Self> {
         cloud.validate("the cloud of voxels")?;
         let bounds = bounds(&cloud.points);

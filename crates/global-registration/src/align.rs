@@ -8,7 +8,7 @@ use statistics::Distribution;
 
 use super::description::feature_cloud::FeatureCloud;
 use super::description::features::Features;
-use super::hypotheses::correspondences::{Correspondences, Tolerance};
+use super::hypotheses::correspondences::Correspondences;
 use super::hypotheses::graph::ConsistencyGraph;
 use super::hypotheses::matching::{Match, matches};
 use super::options::{CoarseOptions, SharedError};
@@ -25,10 +25,9 @@ const MOST_CANDIDATES: usize = 120;
 const SECOND_LOOK: usize = 4;
 /// Of the sampled points, one in this many ranks the candidates.
 const RANKING_STRIDE: usize = 4;
-/// Largest difference of the cosines of normals at which two correspondences agree.
-const COSINE_TOLERANCE: f32 = 0.25;
 /// Poses closer than this are one, voxels.
 const SAME_POSE_VOXELS: f64 = 4.0;
+
 /// An alignment without a guess that passed the verification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoarseAlignment {
@@ -135,26 +134,17 @@ pub fn hypotheses(
 ) -> Result<Vec<(Isometry3<f64>, f64)>> {
     let (source, target) = with_common_voxels(source, target, options)?;
     let (source, target) = (source.as_ref(), target.as_ref());
-    let voxel_m = target.voxel_m();
-    let correspondences = correspondences(source, target);
-    let score = |hypothesis: &Hypothesis| {
-        let verdict = Verdict::with(source, target, &hypothesis.pose, 1, super::description::view::Jumps::Missed);
-        (hypothesis.pose, verdict.rough_score())
-    };
-    let mut scored: Vec<(Isometry3<f64>, f64)> =
-        verified(source, target, &correspondences, options, 1).par_iter().map(score).collect();
-    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut kept: Vec<(Isometry3<f64>, f64)> = Vec::new();
-    for (pose, score) in scored {
-        if !kept.iter().any(|(other, _)| is_same(other, &pose, voxel_m, source)) {
-            kept.push((pose, score));
-        }
-    }
-    Ok(kept.iter().map(|(pose, score)| (target.between_frames(source, pose), *score)).collect())
+    let verified = verified(source, target, &correspondences(source, target), options, 1);
+    let poses = verified.iter().map(|hypothesis| hypothesis.pose).collect();
+    let ranked = ranked(source, target, poses, usize::MAX, |pose| {
+        Verdict::with(source, target, pose, 1, super::description::view::Jumps::Missed).rough_score()
+    });
+    Ok(ranked.iter().map(|(pose, score)| (target.between_frames(source, pose), *score)).collect())
 }
 
-fn tolerance(target: &FeatureCloud, options: &CoarseOptions) -> Tolerance {
-    Tolerance { distance: (options.tolerance_voxels * target.voxel_m()) as f32, cosine: COSINE_TOLERANCE }
+/// Distance up to which a correspondence agrees with a pose, metre.
+fn tolerance(target: &FeatureCloud, options: &CoarseOptions) -> f32 {
+    (options.tolerance_voxels * target.voxel_m()) as f32
 }
 
 /// The best poses of the correspondences, refined and judged; `effort` as for [`looked_for`].
@@ -172,7 +162,7 @@ fn verified(
         let verdict = Verdict::new(source, target, pose, RANKING_STRIDE);
         verdict.rough_score() + correspondences.added_share(pose, tolerance)
     });
-    let verify = |pose: &Isometry3<f64>| {
+    let verify = |(pose, _): &(Isometry3<f64>, f64)| {
         let refined = refine(source, target, pose);
         let verdict = Verdict::new(source, target, &refined.pose, 1);
         let added = verdict.points() as f64 * correspondences.added_share(&refined.pose, tolerance);
@@ -215,7 +205,7 @@ fn correspondences(source: &FeatureCloud, target: &FeatureCloud) -> Corresponden
         most_alike(&mut found, share);
         for m in found {
             let (i, j) = (m.source as usize, m.target as usize);
-            all.push((s.points[i], s.normals[i]), (t.points[j], t.normals[j]), m.likeness);
+            all.push((s.points[i], s.normals[i]), (t.points[j], t.normals[j]));
         }
     }
     all.of_surface = all.len();
@@ -223,8 +213,7 @@ fn correspondences(source: &FeatureCloud, target: &FeatureCloud) -> Corresponden
         let mut found = matches(&s.table, &t.table);
         most_alike(&mut found, share);
         for m in found {
-            let (from, to) = (placed(source, s, m.source), placed(target, t, m.target));
-            all.push(from, to, m.likeness);
+            all.push(placed(source, s, m.source), placed(target, t, m.target));
         }
     }
     all
@@ -244,8 +233,8 @@ fn placed(cloud: &FeatureCloud, features: &Features, index: u32) -> ([f32; 3], [
 }
 
 /// Poses of sets of correspondences that agree, each fitted again to all that agree with it.
-fn candidates(correspondences: &Correspondences, tolerance: Tolerance, most: usize) -> Vec<Isometry3<f64>> {
-    let arm = 2.0 * tolerance.distance;
+fn candidates(correspondences: &Correspondences, tolerance: f32, most: usize) -> Vec<Isometry3<f64>> {
+    let arm = 2.0 * tolerance;
     let solve = |set: &[u32]| {
         let first = correspondences.solve(set, arm)?;
         let inliers = correspondences.inliers(&first, tolerance);
@@ -261,20 +250,20 @@ fn candidates(correspondences: &Correspondences, tolerance: Tolerance, most: usi
     poses
 }
 
-/// The poses with the best scores, each different from those before.
+/// The poses with the best scores, each different from those before, with their scores.
 fn ranked(
     source: &FeatureCloud,
     target: &FeatureCloud,
     candidates: Vec<Isometry3<f64>>,
     count: usize,
     score: impl Fn(&Isometry3<f64>) -> f64 + Sync,
-) -> Vec<Isometry3<f64>> {
-    let mut scored: Vec<(f64, Isometry3<f64>)> = candidates.into_par_iter().map(|pose| (score(&pose), pose)).collect();
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut kept: Vec<Isometry3<f64>> = Vec::new();
-    for (_, pose) in scored {
-        if !kept.iter().any(|other| is_same(other, &pose, target.voxel_m(), source)) {
-            kept.push(pose);
+) -> Vec<(Isometry3<f64>, f64)> {
+    let mut scored: Vec<(Isometry3<f64>, f64)> = candidates.into_par_iter().map(|pose| (pose, score(&pose))).collect();
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut kept: Vec<(Isometry3<f64>, f64)> = Vec::new();
+    for (pose, score) in scored {
+        if !kept.iter().any(|(other, _)| is_same(other, &pose, target.voxel_m(), source)) {
+            kept.push((pose, score));
         }
         if kept.len() == count {
             break;

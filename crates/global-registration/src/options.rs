@@ -1,6 +1,6 @@
 //! What can be chosen in an alignment without a guess.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rigid_pose::{require_option, require_points};
 
 use crate::error::Result;
@@ -17,6 +17,17 @@ pub enum Viewpoint {
     /// Unknown or several: normals that come with the cloud keep their side, others have none, and the verification
     /// knows nothing about free space.
     Unknown,
+}
+
+impl Viewpoint {
+    /// The viewpoint relative to a cloud's middle, where there is one.
+    pub(crate) fn about(self, middle: &Vector3<f64>) -> Option<Vector3<f64>> {
+        match self {
+            Self::Origin => Some(-middle),
+            Self::At(point) => Some(point.coords - middle),
+            Self::Unknown => None,
+        }
+    }
 }
 
 /// Descriptors that are computed from the surface.

@@ -3,7 +3,7 @@
 #![allow(missing_docs)] // criterion_group! makes a public function
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use icp_registration::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};
+use icp_registration::{VoxelAlignmentOptions, VoxelCloud, downsample};
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
 
@@ -31,9 +31,9 @@ fn benches(criterion: &mut Criterion) {
             target.transformed(&Isometry3::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.01, 0.02, -0.01)));
         group.bench_function(BenchmarkId::new("downsample", &name), |b| b.iter(|| downsample(&target, 0.05)));
         group.bench_function(BenchmarkId::new("VoxelCloud::new", &name), |b| {
-            b.iter(|| VoxelCloud::new(&target, &VoxelOptions::default()));
+            b.iter(|| VoxelCloud::new(&target, None));
         });
-        let prepare = |cloud| VoxelCloud::new(cloud, &VoxelOptions::default());
+        let prepare = |cloud| VoxelCloud::new(cloud, None);
         let (Ok(target), Ok(source)) = (prepare(&target), prepare(&source)) else { continue };
         group.bench_function(BenchmarkId::new("VoxelCloud::align", &name), |b| {
             b.iter(|| target.align(&source, &Isometry3::identity(), &VoxelAlignmentOptions::default()));

@@ -21,51 +21,52 @@ pub enum RobustKernel {
 }
 
 impl RobustKernel {
+    /// The constant `c` of the kernel, in units of the scale: 95 % efficiency.
+    fn tuning(self) -> f64 {
+        match self {
+            Self::None => f64::INFINITY,
+            Self::Huber => 1.345,
+            Self::Tukey => TUKEY,
+            Self::Cauchy => 2.385,
+            Self::GemanMcClure => 3.787,
+            Self::Welsch => 2.985,
+        }
+    }
+
     /// Weight of a residual `u` (in units of the scale): between 0 and 1, 1 at 0.
     #[must_use]
     pub fn weight(self, u: f64) -> f64 {
+        let c = self.tuning();
+        let s = (u / c).powi(2);
         match self {
             Self::None => 1.0,
-            Self::Huber => (HUBER / u.abs()).min(1.0),
-            Self::Tukey => (1.0 - (u / TUKEY).powi(2)).max(0.0).powi(2),
-            Self::Cauchy => 1.0 / (1.0 + (u / CAUCHY).powi(2)),
-            Self::GemanMcClure => (1.0 + (u / GEMAN_MCCLURE).powi(2)).powi(-2),
-            Self::Welsch => (-(u / WELSCH).powi(2)).exp(),
+            Self::Huber => (c / u.abs()).min(1.0),
+            Self::Tukey => (1.0 - s).max(0.0).powi(2),
+            Self::Cauchy => 1.0 / (1.0 + s),
+            Self::GemanMcClure => (1.0 + s).powi(-2),
+            Self::Welsch => (-s).exp(),
         }
     }
 
     /// Slope of the influence function `u · weight(u)`: how much the estimating equations change with `u`.
     #[must_use]
     pub fn influence_slope(self, u: f64) -> f64 {
+        let c = self.tuning();
+        let s = (u / c).powi(2);
         match self {
             Self::None => 1.0,
-            Self::Huber => f64::from(u8::from(u.abs() <= HUBER)),
-            Self::Tukey => {
-                let s = (u / TUKEY).powi(2);
-                if s < 1.0 { (1.0 - s) * (1.0 - 5.0 * s) } else { 0.0 }
-            }
-            Self::Cauchy => {
-                let s = (u / CAUCHY).powi(2);
-                (1.0 - s) / (1.0 + s).powi(2)
-            }
-            Self::GemanMcClure => {
-                let s = (u / GEMAN_MCCLURE).powi(2);
-                (1.0 - 3.0 * s) / (1.0 + s).powi(3)
-            }
-            Self::Welsch => {
-                let s = (u / WELSCH).powi(2);
-                (1.0 - 2.0 * s) * (-s).exp()
-            }
+            Self::Huber => f64::from(u8::from(u.abs() <= c)),
+            Self::Tukey if s < 1.0 => (1.0 - s) * (1.0 - 5.0 * s),
+            Self::Tukey => 0.0,
+            Self::Cauchy => (1.0 - s) / (1.0 + s).powi(2),
+            Self::GemanMcClure => (1.0 - 3.0 * s) / (1.0 + s).powi(3),
+            Self::Welsch => (1.0 - 2.0 * s) * (-s).exp(),
         }
     }
 }
 
-const HUBER: f64 = 1.345;
 /// Standard deviations from which on the biweight gives no weight: 95 % efficiency on normally distributed residuals.
 pub const TUKEY: f64 = 4.685;
-const CAUCHY: f64 = 2.385;
-const GEMAN_MCCLURE: f64 = 3.787;
-const WELSCH: f64 = 2.985;
 
 #[cfg(test)]
 mod tests {

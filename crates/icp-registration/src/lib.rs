@@ -20,4 +20,4 @@ pub use result::{DegeneracyPolicy, IcpResult, StopReason};
 pub use rigid_pose;
 pub use system::System;
 pub use target::IcpTarget;
-pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};
+pub use voxels::{VoxelAlignmentOptions, VoxelCloud, downsample};

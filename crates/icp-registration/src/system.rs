@@ -3,7 +3,7 @@
 //! Motions are `[dt, rho w]`: translation and rotation about the centroid of the pairs in target axes, the rotation
 //! multiplied by the rms radius of the pairs. All six are lengths, so that one eigenvalue compares with another.
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, UnitQuaternion, Vector6};
 use rayon::prelude::*;
 use statistics::{CHI_MEDIANS, mad_scale, upper_median};
 
@@ -37,22 +37,9 @@ impl<'a> System<'a> {
         pairs: &'a [Pair],
         (kernel, widening): (RobustKernel, f64),
     ) -> Self {
-        let n = pairs.len().max(1) as f64;
-        let centre = pairs.iter().fold(Vector3::zeros(), |sum, p| sum + p.moved) / n;
-        let square: f64 = pairs.iter().map(|p| (p.moved - centre).norm_squared()).sum();
         // Pairs all in one place leave the rotation undetermined whatever the radius.
-        let radius_m = (square / n).sqrt().max(f64::MIN_POSITIVE.sqrt());
-        let lengths = Vec::new();
-        let mut system = Self {
-            scene,
-            metric,
-            pairs,
-            kernel,
-            frame: Centred { centre, radius_m },
-            scale: 1.0,
-            balance: 1.0,
-            lengths,
-        };
+        let frame = Centred::about(pairs.iter().map(|pair| pair.moved), f64::MIN_POSITIVE.sqrt());
+        let mut system = Self { scene, metric, pairs, kernel, frame, scale: 1.0, balance: 1.0, lengths: Vec::new() };
         system.balance = system.balance_of_channels();
         system.lengths = system.all_lengths();
         let mut whitened: Vec<f64> = pairs.iter().zip(&system.lengths).map(|(p, l)| l * p.weight.sqrt()).collect();

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::common::{Pinhole, Scene, frame_pair, look_at, pose_error};
-use icp_registration::{Error, IcpOptions, IcpTarget, Metric, VoxelCloud, VoxelOptions, align};
+use icp_registration::{Error, IcpOptions, IcpTarget, Metric, VoxelCloud, align};
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::{Cloud, NeighbourTree, UnorganisedNormalOptions, unorganised_normals};
 
@@ -60,7 +60,7 @@ fn zeros_for_no_range_are_refused_by_name() {
     let of = cloud.len();
     let is_named = |error: Error| matches!(error, Error::Cloud(point_cloud::Error::Unmeasured { found: 20_000, of: all, .. }) if all == of);
     assert!(IcpTarget::new(cloud.clone()).is_err_and(is_named));
-    assert!(VoxelCloud::new(&cloud, &VoxelOptions::default()).is_err_and(is_named));
+    assert!(VoxelCloud::new(&cloud, None).is_err_and(is_named));
     let options = IcpOptions::default();
     assert!(align(&cloud, &cloud, &Isometry3::identity(), &options).is_err_and(is_named));
     // Of a frame they are left out as what is not finite.

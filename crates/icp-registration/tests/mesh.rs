@@ -7,7 +7,6 @@ use icp_registration::parts::{ClosestOnMesh, PointToPoint, TriangleMesh};
 use icp_registration::{Error, MotionKind, Registration};
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
-use point_cloud::Error as CloudError;
 use rigid_pose::InputError;
 use rigid_pose::pose_difference;
 

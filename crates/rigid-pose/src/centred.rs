@@ -28,6 +28,16 @@ pub struct Centred {
 }
 
 impl Centred {
+    /// About the mean of places (metre, most often those of pairs), with their rms distance from it, but at least `least_m`, as
+    /// radius.
+    #[must_use]
+    pub fn about(places: impl ExactSizeIterator<Item = Vector3<f64>> + Clone, least_m: f64) -> Self {
+        let count = places.len().max(1) as f64;
+        let centre = places.clone().fold(Vector3::zeros(), |sum, place| sum + place) / count;
+        let square: f64 = places.map(|place| (place - centre).norm_squared()).sum();
+        Self { centre, radius_m: (square / count).sqrt().max(least_m) }
+    }
+
     /// Derivative by the motion of the distance along `direction` (target axes) of a point at `place` (target frame, metre).
     #[inline]
     #[must_use]
@@ -59,6 +69,12 @@ impl Centred {
         jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&(r_transposed / self.radius_m));
         jacobian
     }
+}
+
+/// Larger of the two parts of a motion.
+#[must_use]
+pub fn motion_length(motion: &Vector6<f64>) -> f64 {
+    motion.fixed_rows::<3>(0).norm().max(motion.fixed_rows::<3>(3).norm())
 }
 
 /// Normal equations of a motion: `Σ w J Jᵀ` and `Σ w J r` over residuals r with derivatives J and weights w.

@@ -12,7 +12,7 @@ pub use absolute_orientation::{
     Orientation, RotationMethod, Similarity, absolute_orientation, absolute_orientation_by,
     absolute_orientation_with_scale,
 };
-pub use centred::{Centred, MotionEquations, free_of, symmetric};
+pub use centred::{Centred, MotionEquations, free_of, motion_length, symmetric};
 pub use error::InputError;
 pub use motions::eigen6;
 pub use nalgebra;

@@ -18,7 +18,7 @@ use crate::error::Result;
 use point_cloud::Cloud;
 
 /// Fewest averaged points.
-const LEAST_POINTS: usize = 10;
+pub(crate) const LEAST_POINTS: usize = 10;
 /// Points that a pose is judged by.
 const SAMPLES: usize = 1500;
 
@@ -67,12 +67,8 @@ impl FeatureCloud {
 
     fn of_reduced(mut reduced: Reduced, options: &CoarseOptions, viewpoint: Viewpoint) -> Result<Self> {
         if reduced.len() < LEAST_POINTS {
-            return Err(InputError::TooFewPoints {
-                what: "occupied voxels",
-                found: reduced.len(),
-                needed: LEAST_POINTS,
-            }
-            .into());
+            let found = reduced.len();
+            return Err(InputError::TooFewPoints { what: "occupied voxels", found, needed: LEAST_POINTS }.into());
         }
         let voxel = reduced.voxel_m as f32;
         let radius = options.descriptor_radius_voxels as f32 * voxel;
@@ -84,27 +80,20 @@ impl FeatureCloud {
             let is_usable = |i: usize| i.is_multiple_of(cells) && !normals.vectors[i][0].is_nan();
             Labels::new(&reduced.points, is_usable, cells as f32 * voxel)
         });
-        let eye = match viewpoint {
-            Viewpoint::Origin => Some(-reduced.middle),
-            Viewpoint::At(point) => Some(point.coords - reduced.middle),
-            Viewpoint::Unknown => None,
-        };
-        let eye = eye.map(|eye| [eye.x as f32, eye.y as f32, eye.z as f32]);
+        let eye = viewpoint.about(&reduced.middle).map(|eye| eye.cast::<f32>().into());
         let view = eye.and_then(|eye| View::new(&reduced.points, eye, 1.6 * voxel, 2.0 * voxel));
         let sample = sample(&normals);
-        let descriptor_radius = radius;
-        let added = Vec::new();
         let squares: f64 = reduced.points.iter().flatten().map(|c| f64::from(*c).powi(2)).sum();
         let radius_m = (squares / reduced.len() as f64).sqrt();
         Ok(Self {
             reduced,
             normals,
             surroundings,
-            descriptor_radius,
+            descriptor_radius: radius,
             radius_m,
             viewpoint,
             surface_features,
-            added,
+            added: Vec::new(),
             sample,
             labels,
             view,

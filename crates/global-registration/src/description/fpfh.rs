@@ -19,16 +19,14 @@ const BINS: usize = 11;
 const WIDTH: usize = 40;
 /// Entry of the padding that takes pairs without angles.
 const NOWHERE: usize = WIDTH - 1;
-const POINTS_PER_TASK: usize = 256;
-/// Pairs that are computed side by side.
-const LANES: usize = 16;
+/// What is computed side by side: pairs here, columns where descriptors are compared.
+pub(crate) const LANES: usize = 16;
 
 /// Descriptors of all points; zeros where a point has no normal or hardly neighbours.
 pub(crate) fn fpfh(points: &[[f32; 3]], normals: &Normals, surroundings: &Surroundings) -> DescriptorTable {
     let simple = pulp::Arch::new().dispatch(|| simple_histograms(points, normals, surroundings));
     let rows: Vec<[f32; WIDTH]> = (0..points.len())
         .into_par_iter()
-        .with_min_len(POINTS_PER_TASK)
         .map(|i| if normals.vectors[i][0].is_nan() { [0.0; WIDTH] } else { averaged(&simple, surroundings, i) })
         .collect();
     DescriptorTable::of_histograms(rows.as_flattened().to_vec(), WIDTH)

@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 use rigid_pose::InputError;
 
 use crate::cells::{CellTable, key_of};
+use crate::description::feature_cloud::LEAST_POINTS;
 use crate::error::Result;
 use point_cloud::Cloud;
 
@@ -39,7 +40,7 @@ impl Reduced {
         let (middle, radius) = middle_and_radius(&cloud.points);
         let mut voxel = voxel_m.unwrap_or_else(|| on_ladder(radius / VOXELS_IN_RADIUS));
         if !(voxel > 0.0 && voxel.is_finite()) {
-            return Err(InputError::TooFewPoints { what: "cloud of features", found: 1, needed: 10 }.into());
+            return Err(InputError::TooFewPoints { what: "cloud of features", found: 1, needed: LEAST_POINTS }.into());
         }
         loop {
             let (reduced, count) = Self::with_voxel(cloud, middle, voxel);

@@ -31,7 +31,6 @@ pub struct SurfaceRadii {
 pub(crate) fn rsd(normals: &Normals, surroundings: &Surroundings, radius: f32) -> DescriptorTable {
     let rows: Vec<[f32; WIDTH]> = (0..normals.vectors.len())
         .into_par_iter()
-        .with_min_len(256)
         .map(|i| {
             let mut histogram = [0.0; WIDTH];
             for (distance, angle) in pairs(normals, i, surroundings.of(i)) {

@@ -26,14 +26,9 @@ impl Normals {
     pub(crate) fn new(reduced: &Reduced, surroundings: &Surroundings, viewpoint: Viewpoint) -> Self {
         let radius = (NORMAL_RADIUS_VOXELS * reduced.voxel_m) as f32;
         let given = reduced.given_normals.iter().any(|n| n.iter().any(|c| *c != 0.0));
-        let eye = match viewpoint {
-            Viewpoint::Origin => Some(-reduced.middle),
-            Viewpoint::At(point) => Some(point.coords - reduced.middle),
-            Viewpoint::Unknown => None,
-        };
+        let eye = viewpoint.about(&reduced.middle);
         let vectors = (0..reduced.len())
             .into_par_iter()
-            .with_min_len(512)
             .map(|i| {
                 let near = surroundings.of(i);
                 let Some(normal) = plane_normal(&reduced.points, i, near, radius * radius) else {

@@ -2,8 +2,7 @@
 
 use crate::description::fpfh::{dot, subtract};
 
-/// Cells along the edge of a face.
-const FEWEST: f32 = 8.0;
+/// Most cells along the edge of a face.
 const MOST: f32 = 256.0;
 /// Ranges that differ by more than this many tolerances about a direction belong to several surfaces.
 const JUMP: f32 = 3.0;
@@ -33,7 +32,7 @@ pub(crate) enum Jumps {
     MissedByFronts,
 }
 
-/// Nearest and farthest range in each direction.
+/// Nearest and farthest range in each direction; the nearest also of those about it.
 #[derive(Debug, Clone)]
 pub(crate) struct View {
     eye: [f32; 3],
@@ -49,7 +48,7 @@ impl View {
         let mut ranges: Vec<f32> = points.iter().map(|p| length(subtract(*p, eye))).collect();
         let half = ranges.len() / 2;
         let median = *ranges.get_mut(..)?.select_nth_unstable_by(half, f32::total_cmp).1;
-        let edge = (2.0 * median / spacing).clamp(FEWEST, MOST) as usize;
+        let edge = (2.0 * median / spacing).clamp(1.0, MOST) as usize;
         let cells = 6 * edge * edge;
         let mut view = Self { eye, edge, nearest: vec![f32::INFINITY; cells], farthest: vec![0.0; cells], tolerance };
         for point in points {
@@ -57,7 +56,8 @@ impl View {
             view.nearest[cell] = view.nearest[cell].min(range);
             view.farthest[cell] = view.farthest[cell].max(range);
         }
-        view.nearest = view.nearest_around();
+        let faces = view.nearest.chunks_exact(edge * edge);
+        view.nearest = faces.flat_map(|face| least_around(face, edge)).collect();
         Some(view)
     }
 
@@ -98,23 +98,21 @@ impl View {
         let (u, v) = (place(d[(axis + 1) % 3]).min(self.edge - 1), place(d[(axis + 2) % 3]).min(self.edge - 1));
         Some(((face * self.edge + v) * self.edge + u, length(d)))
     }
+}
 
-    /// The nearest range among a cell and its neighbours on the face: beside a jump of the range nothing is certain.
-    fn nearest_around(&self) -> Vec<f32> {
-        let edge = self.edge;
-        (0..self.nearest.len())
-            .map(|cell| {
-                let (u, v, face) = (cell % edge, cell / edge % edge, cell / edge / edge);
-                let mut least = f32::INFINITY;
-                for row in v.saturating_sub(1)..=(v + 1).min(edge - 1) {
-                    for column in u.saturating_sub(1)..=(u + 1).min(edge - 1) {
-                        least = least.min(self.nearest[(face * edge + row) * edge + column]);
-                    }
-                }
-                least
-            })
-            .collect()
-    }
+/// The least of each cell of a face and those about it, for beside a jump of the range nothing is certain; zero where it is not
+/// known itself.
+pub(crate) fn least_around(cells: &[f32], edge: usize) -> Vec<f32> {
+    let least = |(cell, own): (usize, &f32)| {
+        if own.is_infinite() {
+            return 0.0;
+        }
+        let (u, v) = (cell % edge, cell / edge);
+        let rows = v.saturating_sub(1)..=(v + 1).min(edge - 1);
+        let columns = u.saturating_sub(1)..=(u + 1).min(edge - 1);
+        rows.flat_map(|row| columns.clone().map(move |column| cells[row * edge + column])).fold(*own, f32::min)
+    };
+    cells.iter().enumerate().map(least).collect()
 }
 
 fn length(d: [f32; 3]) -> f32 {

@@ -8,6 +8,10 @@ use nalgebra::{Isometry3, Point3};
 use crate::description::fpfh::{dot, subtract};
 use rigid_pose::absolute_orientation;
 
+/// Largest difference of the cosines between normals, and of normals with the line between the points, at which two
+/// correspondences agree.
+const COSINE_TOLERANCE: f32 = 0.25;
+
 /// Points and unit normals in one frame; a normal of NaN is unknown.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Side {
@@ -20,32 +24,20 @@ pub(crate) struct Side {
 pub(crate) struct Correspondences {
     pub(crate) source: Side,
     pub(crate) target: Side,
-    /// How alike the descriptors are, 1 where they are equal.
-    pub(crate) likeness: Vec<f32>,
     /// The first so many are of the surface, the others were found by other means.
     pub(crate) of_surface: usize,
 }
 
-/// Differences up to which two correspondences agree with each other, or one with a pose.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Tolerance {
-    /// Metre.
-    pub(crate) distance: f32,
-    /// Of cosines between normals, and of normals with the line between the points.
-    pub(crate) cosine: f32,
-}
-
 impl Correspondences {
     pub(crate) fn len(&self) -> usize {
-        self.likeness.len()
+        self.source.points.len()
     }
 
-    pub(crate) fn push(&mut self, source: ([f32; 3], [f32; 3]), target: ([f32; 3], [f32; 3]), likeness: f32) {
+    pub(crate) fn push(&mut self, source: ([f32; 3], [f32; 3]), target: ([f32; 3], [f32; 3])) {
         self.source.points.push(source.0);
         self.source.normals.push(source.1);
         self.target.points.push(target.0);
         self.target.normals.push(target.1);
-        self.likeness.push(likeness);
     }
 
     /// Pose that carries the chosen sources onto their targets best. Normals count as points at `arm` metre off the
@@ -67,7 +59,7 @@ impl Correspondences {
     }
 
     /// Share of those found by other means that agree with a pose; 0 where there are none.
-    pub(crate) fn added_share(&self, pose: &Isometry3<f64>, tolerance: Tolerance) -> f64 {
+    pub(crate) fn added_share(&self, pose: &Isometry3<f64>, tolerance: f32) -> f64 {
         if self.of_surface == self.len() {
             return 0.0;
         }
@@ -75,10 +67,10 @@ impl Correspondences {
         agree as f64 / (self.len() - self.of_surface) as f64
     }
 
-    /// Correspondences that agree with a pose in position and normal.
-    pub(crate) fn inliers(&self, pose: &Isometry3<f64>, tolerance: Tolerance) -> Vec<u32> {
+    /// Correspondences that agree with a pose in position, to `tolerance` metre, and normal.
+    pub(crate) fn inliers(&self, pose: &Isometry3<f64>, tolerance: f32) -> Vec<u32> {
         let motion = Motion::new(pose);
-        let limit = tolerance.distance * tolerance.distance;
+        let limit = tolerance * tolerance;
         (0..self.len())
             .filter(|&i| {
                 let difference = subtract(motion.point(self.source.points[i]), self.target.points[i]);
@@ -92,9 +84,9 @@ impl Correspondences {
 
 /// Whether one rigid motion can carry the sources of two correspondences (source point and normal, target point and
 /// normal) onto their targets: distance, normals and their angles with the connecting line stay. Two that nearly coincide
-/// say the same and count as no support.
+/// say the same and count as no support. `tolerance`: of distances, metre.
 #[inline(always)]
-pub(crate) fn agree(first: &[f32; 12], second: &[f32; 12], tolerance: Tolerance) -> bool {
+pub(crate) fn agree(first: &[f32; 12], second: &[f32; 12], tolerance: f32) -> bool {
     let three = |row: &[f32; 12], k: usize| [row[k], row[k + 1], row[k + 2]];
     let d = subtract(three(second, 0), three(first, 0));
     let e = subtract(three(second, 6), three(first, 6));
@@ -105,10 +97,10 @@ pub(crate) fn agree(first: &[f32; 12], second: &[f32; 12], tolerance: Tolerance)
     let at_first = (dot(n, d) - dot(u, e)).abs();
     let at_second = (dot(m, d) - dot(v, e)).abs();
     // Errors of a normal turn the line by that angle, errors of the points move the projection itself.
-    let slack = tolerance.cosine * dd + tolerance.distance;
+    let slack = COSINE_TOLERANCE * dd + tolerance;
     // An unknown normal is NaN: only a proven contradiction refuses.
-    let contradicts = (between > tolerance.cosine) | (at_first > slack) | (at_second > slack);
-    ((dd - ee).abs() <= tolerance.distance) & (dd > 2.0 * tolerance.distance) & !contradicts
+    let contradicts = (between > COSINE_TOLERANCE) | (at_first > slack) | (at_second > slack);
+    ((dd - ee).abs() <= tolerance) & (dd > 2.0 * tolerance) & !contradicts
 }
 
 fn point(p: [f32; 3]) -> Point3<f64> {

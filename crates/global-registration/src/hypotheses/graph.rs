@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use crate::hypotheses::correspondences::{Correspondences, Tolerance, agree};
+use crate::hypotheses::correspondences::{Correspondences, agree};
 
 /// Fewest members of a clique.
 const LEAST_MEMBERS: usize = 3;
@@ -21,7 +21,7 @@ pub(crate) struct ConsistencyGraph {
 }
 
 impl ConsistencyGraph {
-    pub(crate) fn new(correspondences: &Correspondences, tolerance: Tolerance) -> Self {
+    pub(crate) fn new(correspondences: &Correspondences, tolerance: f32) -> Self {
         let count = correspondences.len();
         let words = count.div_ceil(64).max(1);
         let mut rows = vec![0; count * words];
@@ -119,7 +119,7 @@ fn columns(correspondences: &Correspondences, i: usize) -> [f32; 12] {
 
 /// The bits of one correspondence against 64 others.
 #[inline(always)]
-fn agreeing(own: &[f32; 12], block: &Block, tolerance: Tolerance) -> u64 {
+fn agreeing(own: &[f32; 12], block: &Block, tolerance: f32) -> u64 {
     let mut flags = [0_u32; 64];
     for lane in 0..64 {
         let other: [f32; 12] = std::array::from_fn(|k| block[k][lane]);

@@ -6,9 +6,8 @@
 use rayon::prelude::*;
 
 use crate::description::descriptors::DescriptorTable;
+use crate::description::fpfh::LANES;
 
-/// Columns that are compared at a time.
-const LANES: usize = 16;
 /// Rows that share the loaded columns.
 const ROWS: usize = 4;
 /// Rows of a task.

@@ -27,11 +27,14 @@ fn from_middle(placed: &Placed<'_>) -> Isometry3<f64> {
     placed.1 * Translation3::from(placed.0.reduced.middle)
 }
 
+fn verdict(a: &Placed<'_>, b: &Placed<'_>, stride: usize, jumps: Jumps) -> Verdict {
+    Verdict::with(b.0, a.0, &(from_middle(a).inverse() * from_middle(b)), stride, jumps)
+}
+
 /// What speaks for two clouds lying like this, in sampled points: those with a partner less those that contradict.
 /// Every `stride`-th sampled point is looked at. Clouds that see nothing in common have none.
 pub fn evidence(a: &Placed<'_>, b: &Placed<'_>, stride: usize) -> f64 {
-    let pose = from_middle(a).inverse() * from_middle(b);
-    Verdict::with(b.0, a.0, &pose, stride, Jumps::Missed).evidence() * stride as f64
+    verdict(a, b, stride, Jumps::Missed).evidence() * stride as f64
 }
 
 /// How the sampled points of two clouds lie for each other: those on the other's surface, and those that contradict it, in
@@ -47,8 +50,7 @@ pub fn agreement_of_rooms(a: &Placed<'_>, b: &Placed<'_>) -> (usize, usize) {
 }
 
 fn counted(a: &Placed<'_>, b: &Placed<'_>, jumps: Jumps) -> (usize, usize) {
-    let pose = from_middle(a).inverse() * from_middle(b);
-    let verdict = Verdict::with(b.0, a.0, &pose, 1, jumps);
+    let verdict = verdict(a, b, 1, jumps);
     let sum = |of: fn(&Count) -> usize| of(&verdict.source) + of(&verdict.target);
     (sum(|c| c.hits), sum(|c| c.in_free + c.missed))
 }

@@ -24,9 +24,8 @@ const PAIRS: usize = 320;
 const SAME_COSINE: f32 = 0.96;
 const SAME_OFFSET_VOXELS: f32 = 0.6;
 const SAME_SLOPE: f32 = 0.03;
-/// Planes that are looked for, and the smallest share of the pairs on one.
+/// Planes that are looked for.
 const MOST_PLANES: usize = 12;
-const LEAST_ON_PLANE: f64 = 0.012;
 /// Steps of a voxel to either side that are tried where planes leave a motion open, the share of the evidence that may be
 /// missing where edges put the pose, and the smallest eigenvalue a point below which a motion is open: planes whose normals
 /// differ by less than 4.4 degrees tell no motion, as noise bends them by that.
@@ -35,8 +34,7 @@ const HARDLY: f64 = 0.25;
 const OPEN: f64 = 6e-3;
 /// Least part of a normal along a motion at which the surface faces it.
 const FACING: f64 = 0.4;
-/// Of what lies anywhere within a step, voxel².
-const STEP_VARIANCE: f64 = 1.0 / 12.0;
+
 /// What a pose's partners tell about the place.
 pub(crate) struct Common {
     /// Share of the sampled points that lie inside in both clouds, of the cloud with fewer.
@@ -108,7 +106,8 @@ impl Common {
             (sum, moment, square) = (sum + weight, moment + weight * step, square + weight * step * step);
         }
         let mean = moment / sum;
-        (mean, square / sum - mean * mean + STEP_VARIANCE)
+        // It may lie anywhere within a step: a twelfth of its square.
+        (mean, square / sum - mean * mean + 1.0 / 12.0)
     }
 
     /// The pose with its verdict and covariance. What planes leave open is put where edges hold it, unless too much speaks
@@ -177,13 +176,10 @@ struct Planes {
 impl Planes {
     fn new(source: &FeatureCloud, cloud: &FeatureCloud, pose: &Isometry3<f64>, pairs: &[[usize; 2]]) -> Self {
         let mut on: Vec<[usize; 2]> = pairs.iter().copied().step_by(pairs.len().div_ceil(PAIRS).max(1)).collect();
-        let least = ((LEAST_ON_PLANE * on.len() as f64) as usize).max(3);
         let count = on.len().max(1) as f64;
         let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
         let place = |i: usize| wide(cloud.reduced.points[i]);
-        let centre = on.iter().fold(Vector3::zeros(), |sum, &[_, i]| sum + place(i)) / count;
-        let spread: f64 = on.iter().map(|&[_, i]| (place(i) - centre).norm_squared()).sum();
-        let frame = Centred { centre, radius_m: (spread / count).sqrt().max(cloud.voxel_m()) };
+        let frame = Centred::about(on.iter().map(|&[_, i]| place(i)), cloud.voxel_m());
         let motion = Motion::new(pose);
         let mut residuals = Vec::new();
         for _ in 0..MOST_PLANES {
@@ -191,7 +187,7 @@ impl Planes {
             // The first of equally large planes.
             let largest =
                 on.iter().step_by(3).map(|&[_, i]| (size(i), i)).fold((0, 0), |a, b| if b.0 > a.0 { b } else { a });
-            if largest.0 < least {
+            if largest.0 < 3 {
                 break;
             }
             let (plane, rest): (Vec<[usize; 2]>, _) = on.iter().partition(|&&[_, i]| is_on_plane(cloud, largest.1, i));

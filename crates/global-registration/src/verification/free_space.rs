@@ -2,6 +2,8 @@
 
 use nalgebra::Point3;
 
+use crate::description::view::least_around;
+
 /// The ranges up to which a station surely saw nothing, by direction: on the six faces of a cube about its viewpoint.
 #[derive(Debug, Clone)]
 pub struct FreeSpace {
@@ -61,18 +63,4 @@ impl FreeSpace {
         let (u, v) = (place(point[(axis + 1) % 3]), place(point[(axis + 2) % 3]));
         Some((2 * axis + usize::from(point[axis] < 0.0), v * self.edge + u))
     }
-}
-
-/// The least of each cell and those about it; zero where it is not known itself.
-fn least_around(cells: &[f32], edge: usize) -> Vec<f32> {
-    let least = |(cell, own): (usize, &f32)| {
-        if own.is_infinite() {
-            return 0.0;
-        }
-        let (u, v) = (cell % edge, cell / edge);
-        let rows = v.saturating_sub(1)..=(v + 1).min(edge - 1);
-        let columns = u.saturating_sub(1)..=(u + 1).min(edge - 1);
-        rows.flat_map(|row| columns.clone().map(move |column| cells[row * edge + column])).fold(*own, f32::min)
-    };
-    cells.iter().enumerate().map(least).collect()
 }

@@ -13,15 +13,12 @@ const LEAST_COSINE: f32 = 0.8;
 /// Largest distance of partners across the surface and in all, voxels.
 const ACROSS_VOXELS: f32 = 0.8;
 const IN_ALL_VOXELS: f32 = 2.0;
-/// A point in free space counts this many times where poses are rough.
-const ROUGH_WEIGHT_OF_FREE: f64 = 2.0;
-/// Points that miss the surface they should lie on, and points in space that the other camera looked through, each
-/// outweigh this many points with a partner once a pose is refined: where two poses differ, both find partners on walls that
-/// are alike, but only the wrong one has more than a few in a hundred that contradict.
-const WEIGHT_OF_MISSED: f64 = 8.0;
-const WEIGHT_OF_FREE: f64 = 16.0;
-/// A point in free space beside one that misses: noise moves the latter over a jump, not the former.
-const FREE_BESIDE_MISSED: f64 = WEIGHT_OF_FREE / WEIGHT_OF_MISSED;
+/// A point in space that the other camera looked through counts this many times, against one with a partner where poses are
+/// rough, and against one that misses the surface it should lie on: noise moves the latter over a jump, not the former.
+const TIMES_IN_FREE: f64 = 2.0;
+/// Points that contradict outweigh this many points with a partner each once a pose is refined: where two poses differ, both
+/// find partners on walls that are alike, but only the wrong one has more than a few in a hundred that contradict.
+const WEIGHT_OF_CONTRADICTION: f64 = 8.0;
 
 /// Counts over the sampled points of one or both clouds.
 #[derive(Debug, Clone, Copy, Default)]
@@ -33,6 +30,13 @@ pub(crate) struct Count {
     pub(crate) in_free: usize,
     /// Where the other camera saw a surface, but without a partner on it.
     pub(crate) missed: usize,
+}
+
+impl Count {
+    /// Points that contradict.
+    fn contradicting(&self) -> f64 {
+        self.missed as f64 + TIMES_IN_FREE * self.in_free as f64
+    }
 }
 
 /// The verdict on a pose.
@@ -77,8 +81,7 @@ impl Verdict {
             count(source, target, pose, 1, Jumps::Missed, |p, n| faces(forward.point(p), forward.vector(n))),
             count(target, source, &back, 1, Jumps::Missed, &faces),
         ];
-        let cost = |c: &Count| c.missed as f64 + FREE_BESIDE_MISSED * c.in_free as f64 - c.hits as f64;
-        counts.iter().map(cost).sum()
+        counts.iter().map(|count| count.contradicting() - count.hits as f64).sum()
     }
 
     /// Share of the points with a partner less those in free space, doubly counted, times the square of the agreement:
@@ -86,15 +89,13 @@ impl Verdict {
     /// has many partners, but misses more.
     pub(crate) fn rough_score(&self) -> f64 {
         let sum = |f: fn(&Count) -> usize| (f(&self.source) + f(&self.target)) as f64;
-        let share = (sum(|c| c.hits) - ROUGH_WEIGHT_OF_FREE * sum(|c| c.in_free)) / sum(|c| c.points).max(1.0);
+        let share = (sum(|c| c.hits) - TIMES_IN_FREE * sum(|c| c.in_free)) / sum(|c| c.points).max(1.0);
         share * self.agreement().powi(2)
     }
 
     /// What speaks for a refined pose, in points: those with a partner less those that contradict.
     pub fn evidence(&self) -> f64 {
-        let of = |count: &Count| {
-            count.hits as f64 - WEIGHT_OF_MISSED * count.missed as f64 - WEIGHT_OF_FREE * count.in_free as f64
-        };
+        let of = |count: &Count| count.hits as f64 - WEIGHT_OF_CONTRADICTION * count.contradicting();
         of(&self.source) + of(&self.target)
     }
 
@@ -105,9 +106,7 @@ impl Verdict {
 
     /// Probability that as much contradicts at a right pose.
     pub(crate) fn consistency(&self, misses: &Misses) -> f64 {
-        let sum = |f: fn(&Count) -> usize| (f(&self.source) + f(&self.target)) as f64;
-        let contradicting = sum(|c| c.missed) + FREE_BESIDE_MISSED * sum(|c| c.in_free);
-        misses.probability(contradicting, self.in_view())
+        misses.probability(self.source.contradicting() + self.target.contradicting(), self.in_view())
     }
 
     /// Points of both clouds that have a partner.

@@ -77,10 +77,7 @@ struct System {
 
 impl System {
     fn new(pairs: &[Pair], voxel_m: f64, level: usize) -> Self {
-        let count = pairs.len().max(1) as f64;
-        let centre = pairs.iter().fold(Vector3::zeros(), |sum, p| sum + p.point) / count;
-        let spread: f64 = pairs.iter().map(|p| (p.point - centre).norm_squared()).sum();
-        let frame = Centred { centre, radius_m: (spread / count).sqrt().max(voxel_m) };
+        let frame = Centred::about(pairs.iter().map(|pair| pair.point), voxel_m);
         let mut system = Self { equations: MotionEquations::default(), frame, weight: 0.0, squares: 0.0 };
         let scale = SCALES[level] * voxel_m;
         for pair in pairs {

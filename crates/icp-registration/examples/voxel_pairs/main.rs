@@ -11,9 +11,7 @@ mod scenes;
 use std::time::Duration;
 
 use common::{Pinhole, frame_pair, pose_error};
-use icp_registration::{
-    IcpOptions, IcpResult, Metric, MotionKind, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align,
-};
+use icp_registration::{IcpOptions, IcpResult, Metric, MotionKind, VoxelAlignmentOptions, VoxelCloud, align};
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 use point_cloud::Cloud;
 use rigid_pose::pose_difference;
@@ -65,8 +63,8 @@ fn register(
     guess: &Isometry3<f64>,
     options: &VoxelAlignmentOptions,
 ) -> Result<IcpResult, icp_registration::Error> {
-    let target = VoxelCloud::new(&views.target, &VoxelOptions::default())?;
-    let source = VoxelCloud::new(&views.source, &VoxelOptions::default())?;
+    let target = VoxelCloud::new(&views.target, None)?;
+    let source = VoxelCloud::new(&views.source, None)?;
     target.align(&source, guess, options)
 }
 
@@ -118,7 +116,7 @@ fn frames(name: &str, camera: &Pinhole, count: u64, write: Option<&str>) {
             if let Some(folder) = write {
                 save(&format!("{folder}/{name}_{k}"), &views);
             }
-            let (_, one) = timed(3, || VoxelCloud::new(&views.target, &VoxelOptions::default()));
+            let (_, one) = timed(3, || VoxelCloud::new(&views.target, None));
             prepare.push(one);
             let (result, least) = timed(3, || register(&views, &Isometry3::identity(), &options));
             let result = result.unwrap();
@@ -310,10 +308,9 @@ fn lidar(target: &str, source: &str) {
     let views = Views { source: read(source), target: read(target), target_from_source: Isometry3::identity() };
     for voxel_m in [None, Some(0.25), Some(0.5), Some(1.0)] {
         let options = VoxelAlignmentOptions { max_start_error_m: Some(1.0), ..VoxelAlignmentOptions::default() };
-        let cut = VoxelOptions { voxel_m };
         let (result, ms) = timed(5, || {
-            let target = VoxelCloud::new(&views.target, &cut).unwrap();
-            let source = VoxelCloud::new(&views.source, &cut).unwrap();
+            let target = VoxelCloud::new(&views.target, voxel_m).unwrap();
+            let source = VoxelCloud::new(&views.source, voxel_m).unwrap();
             (target.align(&source, &Isometry3::identity(), &options), target.voxel_m(), target.len())
         });
         println!("lidar, voxels {:.3} m ({}): {ms:.1} ms", result.1, result.2);

@@ -15,7 +15,7 @@ use nalgebra::Isometry3;
 use crate::error::Result;
 use crate::result::IcpResult;
 use crate::target::IcpTarget;
-use crate::voxels::{VoxelCloud, VoxelOptions};
+use crate::voxels::VoxelCloud;
 use point_cloud::Cloud;
 
 /// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
@@ -31,7 +31,7 @@ pub fn align(source: &Cloud, target: &Cloud, guess: &Isometry3<f64>, options: &I
     let is_bare = [source, target].iter().all(|cloud| cloud.normals.is_none() && cloud.sigma.is_none());
     match options.by_voxels(source.len().min(target.len())).filter(|_| is_bare) {
         Some(options) => {
-            let voxels = |cloud: &Cloud| VoxelCloud::new(cloud, &VoxelOptions::default());
+            let voxels = |cloud: &Cloud| VoxelCloud::new(cloud, None);
             let (target, source) = rayon::join(|| voxels(target), || voxels(source));
             target?.align(&source?, guess, &options)
         }

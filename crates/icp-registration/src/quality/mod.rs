@@ -15,7 +15,7 @@ mod verdict;
 pub(crate) use cells::Cells;
 pub use directions::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
 pub use motion::{MotionKind, UndeterminedMotion};
-pub(crate) use verdict::Verdict;
+pub(crate) use verdict::{ROUNDING, Verdict};
 
 /// What the residuals consist of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

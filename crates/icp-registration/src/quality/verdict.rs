@@ -10,11 +10,10 @@ use crate::quality::UndeterminedMotion;
 use rigid_pose::{Centred, symmetrised};
 
 /// Share of the largest information that rounding can imitate.
-const ROUNDING: f64 = 1e-9;
+pub(crate) const ROUNDING: f64 = 1e-9;
 /// Response over information outside which the differences are noise (matching can only weaken the response, to about
 /// a half).
-const SMALLEST_RESPONSE: f64 = 0.25;
-const LARGEST_RESPONSE: f64 = 2.0;
+const RESPONSE: std::ops::Range<f64> = 0.25..2.0;
 
 /// What pairs say about a pose.
 pub(crate) struct Verdict {
@@ -80,9 +79,6 @@ impl Verdict {
 /// Inverse of the response among the known directions; none where the differences drown in noise.
 fn inverse_response(known: &[&Direction], basis: &DMatrix<f64>, response: &Matrix6<f64>) -> Option<DMatrix<f64>> {
     let reduced = basis.transpose() * response * basis;
-    let plausible = known.iter().enumerate().all(|(k, d)| {
-        let ratio = reduced[(k, k)] / d.information;
-        (SMALLEST_RESPONSE..LARGEST_RESPONSE).contains(&ratio)
-    });
+    let plausible = known.iter().enumerate().all(|(k, d)| RESPONSE.contains(&(reduced[(k, k)] / d.information)));
     if plausible { reduced.try_inverse() } else { None }
 }

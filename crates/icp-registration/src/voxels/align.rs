@@ -10,15 +10,11 @@ use crate::error::Result;
 use crate::kernel::RobustKernel;
 use crate::quality::{Cells, Residuals, Verdict};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
-use rigid_pose::{Centred, InputError, free_of, require_pose};
+use rigid_pose::{Centred, InputError, free_of, motion_length, require_pose};
 
-/// Iterations that a coarse level may take.
-const LEVEL_ITERATIONS: usize = 8;
-/// A coarse level ends when a step is below this fraction of its voxels.
-const LEVEL_STEP: f64 = 0.05;
-/// Partners are kept for good when a step is below this fraction of the finest voxels.
+/// Partners of a level are not looked for anew when a step is below this fraction of its voxels, and after so many steps in any
+/// case: a coarse level ends then, in the finest one they are kept.
 const SETTLED_STEP: f64 = 0.02;
-/// Steps of the finest level after which partners are kept in any case.
 const MOST_SEARCHES: usize = 15;
 /// Planes of a level below which it is passed over.
 const FEWEST_PLANES: usize = 100;
@@ -136,11 +132,11 @@ impl<'a> Run<'a> {
 
     /// Iterates on a coarse level.
     fn level(&mut self, matcher: Matcher<'_>) -> Result<()> {
-        for _ in 0..LEVEL_ITERATIONS {
+        for _ in 0..MOST_SEARCHES {
             let kernel =
                 if self.options.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Cauchy };
             let step = self.step(matcher, Partners::Anew, kernel)?;
-            if length(&step) < LEVEL_STEP * matcher.target.size_m {
+            if motion_length(&step) < SETTLED_STEP * matcher.target.size_m {
                 break;
             }
         }
@@ -152,7 +148,7 @@ impl<'a> Run<'a> {
         let tolerance = self.options.step_tolerance_m.unwrap_or(1e-5 * self.target.radius_m);
         let (mut partners, mut searches) = (Partners::Anew, 0);
         while searches == 0 || self.iterations < self.options.max_iterations {
-            let step = length(&self.step(matcher, partners, self.options.kernel)?);
+            let step = motion_length(&self.step(matcher, partners, self.options.kernel)?);
             if step <= tolerance {
                 return Ok(StopReason::Converged);
             }
@@ -190,7 +186,7 @@ impl<'a> Run<'a> {
         system.frame = frame;
         let mut step = system.step(&free)?;
         // Partners give no reason to move farther than they can be apart.
-        step /= (length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
+        step /= (motion_length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
         self.pose = frame.moved(&pose, &step);
         self.iterations += 1;
         Ok(step)
@@ -207,16 +203,8 @@ impl<'a> Run<'a> {
         let needed = self.options.min_correspondences;
         let system = self.system(matcher, pose, partners, kernel);
         if system.count < needed {
-            let of = matcher.source.voxels.len();
-            let max_distance_m = limit(matcher);
-            return Err(InputError::TooFewCorrespondences {
-                found: system.count,
-                of,
-                needed,
-                max_distance_m,
-                iteration,
-            }
-            .into());
+            let (found, of, max_distance_m) = (system.count, matcher.source.voxels.len(), matcher.limit_m());
+            return Err(InputError::TooFewCorrespondences { found, of, needed, max_distance_m, iteration }.into());
         }
         Ok(system)
     }
@@ -243,22 +231,13 @@ impl<'a> Run<'a> {
             iterations,
             stop,
             correspondences,
-            max_correspondence_distance_m: limit(matcher),
+            max_correspondence_distance_m: matcher.limit_m(),
             degenerate,
         })
     }
 }
 
-fn limit(matcher: Matcher<'_>) -> f64 {
-    super::pairs::REACH * matcher.target.size_m.max(matcher.source.size_m)
-}
-
 /// Size of the cubes whose pairs count as one observation, metre.
 fn cell(system: &System<'_>, matcher: Matcher<'_>) -> f64 {
     (system.frame.radius_m / Cells::PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m)
-}
-
-/// Larger of the two parts of a motion.
-fn length(motion: &Vector6<f64>) -> f64 {
-    motion.fixed_rows::<3>(0).norm().max(motion.fixed_rows::<3>(3).norm())
 }

@@ -6,7 +6,6 @@ use super::level::Level;
 use super::numerics::gather::gather;
 use super::numerics::lattice::{Lattice, bounds};
 use super::numerics::moments::Moments;
-use super::options::VoxelOptions;
 use super::scale::voxel_size;
 use crate::error::Result;
 use point_cloud::Cloud;
@@ -29,16 +28,19 @@ pub struct VoxelCloud {
 impl VoxelCloud {
     /// Sums up the points of each voxel and fits planes to the voxels and their neighbours.
     ///
+    /// `voxel_m`: edge of the finest voxels. `None`: such that the cloud fills about 10 000 of them, or, where it has fewer points
+    /// than that takes, a voxel holds about eight.
+    ///
     /// Normals and standard deviations of the cloud are not used: both come from the scatter of the points. Points at
     /// the rim are left out.
     ///
     /// # Errors
     /// [`InputError::Empty`], [`InputError::NonFinite`], [`InputError::LengthMismatch`], [`InputError::NotPositive`] for the cloud;
-    /// [`Error::VoxelSize`] for a size that is not positive, or of which more than two million lie along the cloud.
-    pub fn new(cloud: &Cloud, options: &VoxelOptions) -> Result<Self> {
+    /// [`Error::VoxelSize`](crate::Error::VoxelSize) for a size that is not positive, or of which more than two million lie along the cloud.
+    pub fn new(cloud: &Cloud, voxel_m: Option<f64>) -> Result<Self> {
         cloud.validate("the cloud of voxels")?;
         let bounds = bounds(&cloud.points);
-        let size_m = match options.voxel_m {
+        let size_m = match voxel_m {
             Some(size_m) => size_m,
             None => voxel_size(&cloud.points, &bounds)?,
         };

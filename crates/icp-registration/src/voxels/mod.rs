@@ -13,4 +13,4 @@ mod wide;
 
 pub use cloud::VoxelCloud;
 pub use downsample::downsample;
-pub use options::{VoxelAlignmentOptions, VoxelOptions};
+pub use options::VoxelAlignmentOptions;

@@ -6,14 +6,6 @@ use crate::error::Result;
 use crate::kernel::RobustKernel;
 use crate::result::DegeneracyPolicy;
 
-/// How a cloud is cut into voxels.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct VoxelOptions {
-    /// Edge of the finest voxels, metre. `None`, the default: such that the cloud fills about 10 000 of them, or, where
-    /// it has fewer points than that takes, a voxel holds about eight.
-    pub voxel_m: Option<f64>,
-}
-
 /// How two clouds of voxels are aligned. The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoxelAlignmentOptions {

@@ -12,7 +12,7 @@ use crate::quality::Cells;
 use rigid_pose::{Centred, MotionEquations};
 
 /// Partners farther apart than this many voxels belong to different things.
-pub(crate) const REACH: f64 = 1.5;
+const REACH: f64 = 1.5;
 /// Share of the offset along the plane by which disagreeing normals make the distance across it unsure.
 const LEVER_SHARE: f64 = 0.1;
 
@@ -58,6 +58,11 @@ pub(crate) enum Partners {
 }
 
 impl Matcher<'_> {
+    /// Largest distance of partners, metre.
+    pub fn limit_m(&self) -> f64 {
+        REACH * self.target.size_m.max(self.source.size_m)
+    }
+
     /// Fills `pairs`, one for each source voxel.
     pub fn fill(&self, pose: &Isometry3<f64>, partners: Partners, pairs: &mut Vec<Pair>) {
         pairs.resize(self.source.voxels.len(), ALONE);
@@ -88,7 +93,7 @@ impl Matcher<'_> {
         let bisector = both / both.norm();
         let offset = moved - target.mean.coords;
         let square = offset.norm_squared();
-        let limit = REACH * self.target.size_m.max(self.source.size_m);
+        let limit = self.limit_m();
         if square.is_nan() || square > limit * limit {
             return None;
         }

@@ -1,6 +1,6 @@
 //! Input that has no answer gets a typed one.
 
-use icp_registration::{Error, IcpResult, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
+use icp_registration::{Error, IcpResult, VoxelAlignmentOptions, VoxelCloud};
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
@@ -14,8 +14,8 @@ fn good() -> Cloud {
 }
 
 fn run(source: &Cloud, target: &Cloud) -> Result<IcpResult, Error> {
-    let target = VoxelCloud::new(target, &VoxelOptions::default())?;
-    let source = VoxelCloud::new(source, &VoxelOptions::default())?;
+    let target = VoxelCloud::new(target, None)?;
+    let source = VoxelCloud::new(source, None)?;
     target.align(&source, &Isometry3::identity(), &VoxelAlignmentOptions::default())
 }
 
@@ -46,7 +46,7 @@ fn clouds_without_an_answer() {
 #[test]
 fn options_outside_their_domain() {
     let good = good();
-    let prepared = VoxelCloud::new(&good, &VoxelOptions::default()).unwrap();
+    let prepared = VoxelCloud::new(&good, None).unwrap();
     let default = VoxelAlignmentOptions::default;
     for options in [
         VoxelAlignmentOptions { max_start_error_m: Some(0.0), ..default() },
@@ -59,8 +59,7 @@ fn options_outside_their_domain() {
         assert!(matches!(result, Err(Error::Input(InputError::InvalidOption { .. }))), "{options:?}");
     }
     for voxel_m in [0.0, -1.0, f64::NAN, 1e-9, 1e-320] {
-        let cut = VoxelOptions { voxel_m: Some(voxel_m) };
-        assert!(matches!(VoxelCloud::new(&good, &cut), Err(Error::VoxelSize { .. })), "{voxel_m}");
+        assert!(matches!(VoxelCloud::new(&good, Some(voxel_m)), Err(Error::VoxelSize { .. })), "{voxel_m}");
     }
     let nowhere = Isometry3::translation(f64::NAN, 0.0, 0.0);
     assert!(matches!(prepared.align(&prepared, &nowhere, &default()), Err(Error::Input(InputError::NonFinite { .. }))));
@@ -68,7 +67,7 @@ fn options_outside_their_domain() {
 
 #[test]
 fn a_cloud_fits_itself_exactly() {
-    let prepared = VoxelCloud::new(&good(), &VoxelOptions::default()).unwrap();
+    let prepared = VoxelCloud::new(&good(), None).unwrap();
     let result = prepared.align(&prepared, &Isometry3::identity(), &VoxelAlignmentOptions::default()).unwrap();
     let error = result.target_from_source;
     // The step tolerance is 1e-5 of the radius.
@@ -80,8 +79,8 @@ fn a_cloud_fits_itself_exactly() {
 fn outliers_far_away_leave_the_pose_alone() {
     let mut cloud = good();
     cloud.points.extend((0..20).map(|i| Point3::from(Vector3::new(37.0, -61.0, 45.0) * f64::from(i))));
-    let target = VoxelCloud::new(&cloud, &VoxelOptions::default()).unwrap();
-    let source = VoxelCloud::new(&good(), &VoxelOptions::default()).unwrap();
+    let target = VoxelCloud::new(&cloud, None).unwrap();
+    let source = VoxelCloud::new(&good(), None).unwrap();
     let result = target.align(&source, &Isometry3::identity(), &VoxelAlignmentOptions::default()).unwrap();
     // Voxels of another size: the scatter of two ways to average one cloud.
     assert!(result.target_from_source.translation.vector.norm() < 3e-3, "{}", result.target_from_source);

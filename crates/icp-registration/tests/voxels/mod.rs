@@ -8,7 +8,7 @@ mod real;
 mod scenes;
 mod verdicts;
 
-use icp_registration::{IcpResult, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
+use icp_registration::{IcpResult, VoxelAlignmentOptions, VoxelCloud};
 use nalgebra::Isometry3;
 use scenes::Views;
 
@@ -17,7 +17,7 @@ fn register(
     guess: &Isometry3<f64>,
     options: &VoxelAlignmentOptions,
 ) -> Result<IcpResult, icp_registration::Error> {
-    let target = VoxelCloud::new(&views.target, &VoxelOptions::default())?;
-    let source = VoxelCloud::new(&views.source, &VoxelOptions::default())?;
+    let target = VoxelCloud::new(&views.target, None)?;
+    let source = VoxelCloud::new(&views.source, None)?;
     target.align(&source, guess, options)
 }

@@ -1,13 +1,13 @@
 //! Real scans, read where they lie; skipped with a word where they are missing.
 
-use icp_registration::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
+use icp_registration::{VoxelAlignmentOptions, VoxelCloud};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use point_cloud::{Cloud, NeighbourTree};
 
 use crate::scans::{median_distance, points, pose_of_rows, real};
 
 fn prepared(points: &[Point3<f64>]) -> VoxelCloud {
-    VoxelCloud::new(&Cloud::new(points.to_vec()), &VoxelOptions::default()).unwrap()
+    VoxelCloud::new(&Cloud::new(points.to_vec()), None).unwrap()
 }
 
 #[test]

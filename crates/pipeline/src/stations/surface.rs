@@ -3,9 +3,7 @@
 use std::sync::Arc;
 
 use global_registration::{CoarseOptions, FeatureCloud, Viewpoint, align_without_guess};
-use icp_registration::{
-    DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, VoxelAlignmentOptions, VoxelCloud, VoxelOptions,
-};
+use icp_registration::{DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, VoxelAlignmentOptions, VoxelCloud};
 use nalgebra::{Isometry3, Point3};
 use point_cloud::Cloud;
 use projective_registration::{FrameAlignmentOptions, OrganisedFrame, Projection, align_frames, frame_consistency};
@@ -50,7 +48,7 @@ impl Surface {
         // Clouds too small to fill voxels are registered point by point.
         let voxels = match frame {
             Some(_) => None,
-            None => VoxelCloud::new(&with_normals(&target), &VoxelOptions::default()).ok(),
+            None => VoxelCloud::new(&with_normals(&target), None).ok(),
         };
         let viewpoint = if station.is_seen_from_origin() { Viewpoint::Origin } else { Viewpoint::Unknown };
         Ok(Self { target, frame, voxels, viewpoint })

@@ -39,7 +39,7 @@ impl Default for OrganisedNormalOptions {
 /// remains, or where its points form a line or a blob.
 ///
 /// # Errors
-/// [`InputError::LengthMismatch`] where the points do not fill the frame, [`InputError::InvalidOption`].
+/// [`InputError::LengthMismatch`](rigid_pose::InputError::LengthMismatch) where the points do not fill the frame, [`InputError::InvalidOption`](rigid_pose::InputError::InvalidOption).
 pub fn organised_normals(
     points: &[[f64; 3]],
     width: usize,

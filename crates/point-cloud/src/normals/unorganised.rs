@@ -28,7 +28,7 @@ impl Default for UnorganisedNormalOptions {
 /// Unit normals of a cloud; NaN in all components where the neighbours form a line or a blob.
 ///
 /// # Errors
-/// [`InputError::Empty`], [`InputError::NonFinite`], [`InputError::InvalidOption`] for fewer than 3 neighbours.
+/// [`InputError::Empty`](rigid_pose::InputError::Empty), [`InputError::NonFinite`](rigid_pose::InputError::NonFinite), [`InputError::InvalidOption`](rigid_pose::InputError::InvalidOption) for fewer than 3 neighbours.
 pub fn unorganised_normals(points: &[Point3<f64>], options: &UnorganisedNormalOptions) -> Result<Vec<Vector3<f64>>> {
     let tree = NeighbourTree::new(points)?;
     normals_with_tree(points, &tree, options)

@@ -62,7 +62,7 @@ impl OrganisedFrame {
     /// theirs.
     ///
     /// # Errors
-    /// [`InputError::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
+    /// [`InputError::LengthMismatch`](rigid_pose::InputError::LengthMismatch) where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
     /// not lie on the rays of their pixels.
     pub fn new(projection: &Arc<Projection>, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<Self> {
         let grid = Arc::clone(&projection.grids[0]);

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use icp_registration::{IcpOptions, IcpResult, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align};
+use icp_registration::{IcpOptions, IcpResult, VoxelAlignmentOptions, VoxelCloud, align};
 use nalgebra::Isometry3;
 use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
 use projective_registration::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection};
@@ -41,8 +41,7 @@ pub fn run(folder: &Path, rest: &[&str]) -> Outcome {
 
 /// From lists of points to the pose, from the identity.
 pub fn by_voxels(target: &Points, source: &Points) -> Result<IcpResult, multiview_registration::Error> {
-    let options = VoxelOptions::default();
-    let [target, source] = [target, source].map(|points| VoxelCloud::new(&cloud(points), &options));
+    let [target, source] = [target, source].map(|points| VoxelCloud::new(&cloud(points), None));
     Ok(target?.align(&source?, &Isometry3::identity(), &VoxelAlignmentOptions::default())?)
 }
 

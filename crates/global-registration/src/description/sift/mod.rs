@@ -15,7 +15,7 @@ use crate::error::Result;
 use describe::{descriptor, orientations};
 use extrema::{Keypoint, extrema};
 use rigid_pose::{InputError, is_usable, require_count, require_length, require_positive};
-use scale_space::{Image, ScaleSpace};
+use scale_space::{Image, SHORTEST_EDGE, ScaleSpace};
 
 /// Options of [`amplitude_features`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,8 +62,9 @@ pub fn amplitude_features(
     let expected = width.saturating_mul(height);
     require_length("amplitude", expected, amplitude.len())?;
     require_length("points of the frame", expected, points.len())?;
-    if width < 16 || height < 16 {
-        return Err(InputError::TooFewPoints { what: "edge of the frame", found: width.min(height), needed: 16 }.into());
+    let (found, needed) = (width.min(height), SHORTEST_EDGE);
+    if found < needed {
+        return Err(InputError::TooFewPoints { what: "edge of the frame", found, needed }.into());
     }
     let space = ScaleSpace::new(&reflectance(amplitude, points, width, height)?);
     let mut keypoints = extrema(&space, options.min_contrast as f32, options.max_edge_ratio as f32);

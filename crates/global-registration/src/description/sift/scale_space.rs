@@ -7,7 +7,7 @@ const FIRST_SIGMA: f32 = 1.6;
 /// Blur that the camera itself is taken to have, pixels.
 const CAMERA_SIGMA: f32 = 0.5;
 /// Octaves end before an edge gets shorter than this, pixels.
-const SHORTEST_EDGE: usize = 16;
+pub(super) const SHORTEST_EDGE: usize = 16;
 
 /// An image, row by row.
 #[derive(Debug, Clone)]

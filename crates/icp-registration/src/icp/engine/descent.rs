@@ -6,21 +6,18 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
-use rigid_pose::InputError;
+use rigid_pose::{InputError, is_usable, motion_length};
 use statistics::upper_median;
 
 use crate::error::Result;
 use crate::icp::engine::matching::Points;
-use crate::icp::engine::registration::{Engine, Track, length};
+use crate::icp::engine::registration::{Engine, Track};
 use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, KernelSchedule, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
 use crate::system::System;
-use rigid_pose::is_usable;
 
 /// Points whose distance at the guess is looked at.
 const GUESS_SAMPLES: usize = 1000;
-/// A limit that no distance reaches, and whose square is finite.
-const NO_LIMIT_M: f64 = 1e120;
 
 /// Distance limits from coarse to fine: the last one doubled up to the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,8 +80,8 @@ fn median_distance(engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f6
         if !is_usable(&moved) {
             return Err(InputError::NonFinite { what: "source points in the target frame", index: source }.into());
         }
-        let normal = guess.rotation * scene.source_normals[source];
-        let query = Query { source, moved: moved.coords, normal, pose: *guess, limit_m: NO_LIMIT_M, remember: false };
+        let (normal, limit_m) = (guess.rotation * scene.source_normals[source], f64::INFINITY);
+        let query = Query { source, moved: moved.coords, normal, pose: *guess, limit_m, remember: false };
         let partner = engine.parts.matching.partner(&query);
         Ok(partner.found.then(|| (partner.point - query.moved).norm()))
     };
@@ -102,14 +99,13 @@ pub struct Alternative<'a> {
     pub rejection: Vec<Box<dyn PairRejection + 'a>>,
 }
 
-impl<'a> Alternative<'a> {
+impl Alternative<'_> {
     /// Free normals; compatible normals; and these by least squares. `trim`: fraction of the pairs to keep.
     pub fn usual(kernel: RobustKernel, max_normal_angle_rad: Option<f64>, trim: Option<f64>) -> Vec<Self> {
-        let with = |kernel: RobustKernel, angle: Option<f64>| {
-            let mut rejection: Vec<Box<dyn PairRejection + 'a>> = Vec::new();
-            rejection.extend(angle.map(|angle| Box::new(MaxNormalAngle(angle)) as Box<dyn PairRejection>));
-            rejection.extend(trim.map(|trim| Box::new(Trimmed(trim)) as Box<dyn PairRejection>));
-            Self { metric: None, kernel: Box::new(kernel), rejection }
+        let with = |kernel: RobustKernel, angle: Option<f64>| Self {
+            metric: None,
+            kernel: Box::new(kernel),
+            rejection: rejections(angle, trim),
         };
         let mut alternatives = vec![with(kernel, None)];
         if max_normal_angle_rad.is_some() {
@@ -120,23 +116,27 @@ impl<'a> Alternative<'a> {
     }
 }
 
+/// The rejections by the angle between normals, radian, and down to a fraction of the pairs, where they are given.
+pub(in crate::icp) fn rejections<'a>(angle: Option<f64>, trim: Option<f64>) -> Vec<Box<dyn PairRejection + 'a>> {
+    let by_angle = angle.map(|angle| Box::new(MaxNormalAngle(angle)) as Box<dyn PairRejection>);
+    by_angle.into_iter().chain(trim.map(|trim| Box::new(Trimmed(trim)) as Box<dyn PairRejection>)).collect()
+}
+
 /// Fraction of the distance limit at which a residual counts half in the comparison of tracks.
 const FIT_RESIDUAL: f64 = 1.0 / 12.0;
 
 /// The first track with the best fit, or the first error.
 fn best_of(tracks: Vec<Result<(f64, Track)>>) -> Result<(f64, Track)> {
-    let mut best: Option<Result<(f64, Track)>> = None;
-    for track in tracks {
-        best = match (best, track) {
-            (None, track) => Some(track),
-            (Some(Ok(before)), Ok(track)) if track.0 > before.0 => Some(Ok(track)),
-            (Some(Err(_)), Ok(track)) => Some(Ok(track)),
-            (before, _) => before,
-        };
+    let better = |before, track| match (&before, &track) {
+        (Ok((least, _)), Ok((fit, _))) if fit > least => track,
+        (Err(_), Ok(_)) => track,
+        _ => before,
+    };
+    tracks.into_iter().reduce(better).unwrap_or(Err(InputError::Numerical {
+        what: "the coarse registration",
+        why: "there was nothing to try",
     }
-    best.unwrap_or(Err(
-        InputError::Numerical { what: "the coarse registration", why: "there was nothing to try" }.into()
-    ))
+    .into()))
 }
 
 impl<'p> Engine<'p> {
@@ -170,8 +170,8 @@ impl<'p> Engine<'p> {
     /// first.
     fn tracks(&self, sample: &[usize], starts: &[Isometry3<f64>], limits: &[f64]) -> Vec<Result<(f64, Track)>> {
         let alternatives: Vec<Engine<'_>> = match self.parts.alternatives.as_slice() {
-            [] => vec![self.with(None)],
-            some => some.iter().map(|alternative| self.with(Some(alternative))).collect(),
+            [] => vec![*self],
+            some => some.iter().map(|alternative| self.with(alternative)).collect(),
         };
         let ways: Vec<(&Isometry3<f64>, &Engine<'_>)> =
             starts.iter().flat_map(|start| alternatives.iter().map(move |engine| (start, engine))).collect();
@@ -182,16 +182,9 @@ impl<'p> Engine<'p> {
         ways.par_iter().map(run).collect()
     }
 
-    fn with(&self, alternative: Option<&'p Alternative<'p>>) -> Engine<'p> {
-        let (parts, scene) = (self.parts, self.scene);
-        let own = Engine { parts, scene, metric: self.metric, rejection: self.rejection, kernel: self.kernel };
-        alternative.map_or(own, |alternative| Engine {
-            parts,
-            scene,
-            metric: alternative.metric.as_deref().unwrap_or(self.metric),
-            rejection: &alternative.rejection,
-            kernel: &*alternative.kernel,
-        })
+    fn with(&self, alternative: &'p Alternative<'p>) -> Engine<'p> {
+        let metric = alternative.metric.as_deref().unwrap_or(self.metric);
+        Engine { metric, rejection: &alternative.rejection, kernel: &*alternative.kernel, ..*self }
     }
 
     fn down(&self, sample: &[usize], guess: &Isometry3<f64>, limits: &[f64]) -> Result<Track> {
@@ -204,7 +197,7 @@ impl<'p> Engine<'p> {
                 }
                 let moment = track.moment(limits, level, iteration);
                 let step = self.step(&mut track, &moment, &mut points)?;
-                if length(&step) < self.parts.levels.step_fraction * limits[level] {
+                if motion_length(&step) < self.parts.levels.step_fraction * limits[level] {
                     break;
                 }
             }

@@ -2,13 +2,12 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
-use rigid_pose::InputError;
+use rigid_pose::{InputError, is_usable};
 
 use crate::error::{Error, Result};
 use crate::icp::engine::registration::Engine;
 use crate::parts::{Moment, Pair, Partner, Query, Scene};
 use point_cloud::Cloud;
-use rigid_pose::is_usable;
 
 /// Points handled together by one thread; fixed, so that sums do not depend on the number of threads.
 pub(crate) const CHUNK: usize = 1024;

@@ -2,11 +2,12 @@
 
 use nalgebra::Matrix6;
 
-use crate::icp::{Alternative, Registration};
+use crate::icp::engine::descent::rejections;
+use crate::icp::{Alternative, Levels, Registration, Starts};
 use crate::kernel::RobustKernel;
 use crate::parts::{
-    AllPoints, EveryNth, MaxNormalAngle, NormalSpace, PairRejection, PlaneToPlane, PointToPlane, PointToPoint,
-    RandomPoints, Settled, Stability, SymmetricPlanes, Trimmed,
+    AllPoints, EveryNth, GaussNewton, NormalSpace, PlaneToPlane, PointMatching, PointToPlane, PointToPoint,
+    RandomPoints, Settled, SigmaWeight, Stability, SymmetricPlanes,
 };
 use crate::result::DegeneracyPolicy;
 use crate::voxels::VoxelAlignmentOptions;
@@ -132,43 +133,50 @@ impl IcpOptions {
         })
     }
 
-    /// Puts the parts that stand for these options into a registration.
-    pub(in crate::icp) fn apply(&self, registration: &mut Registration<'_>) {
+    /// The parts that stand for these options.
+    pub(in crate::icp) fn with_matching<'a>(&self, matching: impl PointMatching + 'a) -> Registration<'a> {
         let angle = self.max_normal_angle_rad;
         let trim = if self.trim.to_bits() == 1.0_f64.to_bits() { None } else { Some(self.trim) };
         let robust = if self.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
-        registration.selection = match self.selection {
-            Selection::All => Box::new(AllPoints),
-            Selection::EveryNth(n) => Box::new(EveryNth(n)),
-            Selection::NormalSpace(count) => Box::new(NormalSpace(count)),
-            Selection::Random { count, seed } => Box::new(RandomPoints { count, seed }),
-            Selection::Stability(count) => Box::new(Stability(count)),
-        };
-        registration.alternatives = Alternative::usual(robust, angle, trim);
-        registration.metric = match self.metric {
-            Metric::PointToPoint => Box::new(PointToPoint),
-            Metric::Automatic | Metric::PointToPlane => Box::new(PointToPlane),
-            Metric::SymmetricPlanes => Box::new(SymmetricPlanes),
-            Metric::PlaneToPlane => Box::new(PlaneToPlane::default()),
-        };
+        let mut alternatives = Alternative::usual(robust, angle, trim);
         if matches!(self.metric, Metric::SymmetricPlanes | Metric::PlaneToPlane) {
             // From afar the target's planes alone draw in farther.
-            for alternative in &mut registration.alternatives {
+            for alternative in &mut alternatives {
                 alternative.metric = Some(Box::new(PointToPlane));
             }
         }
-        let mut rejection: Vec<Box<dyn PairRejection>> = Vec::new();
-        rejection.extend(angle.map(|angle| Box::new(MaxNormalAngle(angle)) as Box<dyn PairRejection>));
-        rejection.extend(trim.map(|trim| Box::new(Trimmed(trim)) as Box<dyn PairRejection>));
-        registration.rejection = rejection;
-        registration.kernel = Box::new(self.kernel);
-        registration.levels.first_limit_m = self.initial_correspondence_distance_m;
-        registration.levels.last_limit_m = self.max_correspondence_distance_m;
         let (max_iterations, step_tolerance_m) = (self.max_iterations, self.step_tolerance_m);
-        registration.stopping = Box::new(Settled { max_iterations, step_tolerance_m, ..Settled::default() });
-        registration.degeneracy = self.degeneracy;
-        registration.prior_covariance = self.prior_covariance;
-        registration.max_motion_sigma_m = self.max_motion_sigma_m;
-        registration.min_correspondences = self.min_correspondences;
+        Registration {
+            selection: match self.selection {
+                Selection::All => Box::new(AllPoints),
+                Selection::EveryNth(n) => Box::new(EveryNth(n)),
+                Selection::NormalSpace(count) => Box::new(NormalSpace(count)),
+                Selection::Random { count, seed } => Box::new(RandomPoints { count, seed }),
+                Selection::Stability(count) => Box::new(Stability(count)),
+            },
+            matching: Box::new(matching),
+            rejection: rejections(angle, trim),
+            weighting: vec![Box::new(SigmaWeight)],
+            metric: match self.metric {
+                Metric::PointToPoint => Box::new(PointToPoint),
+                Metric::Automatic | Metric::PointToPlane => Box::new(PointToPlane),
+                Metric::SymmetricPlanes => Box::new(SymmetricPlanes),
+                Metric::PlaneToPlane => Box::new(PlaneToPlane::default()),
+            },
+            minimisation: Box::new(GaussNewton),
+            kernel: Box::new(self.kernel),
+            levels: Levels {
+                first_limit_m: self.initial_correspondence_distance_m,
+                last_limit_m: self.max_correspondence_distance_m,
+                ..Levels::default()
+            },
+            starts: Some(Starts::default()),
+            alternatives,
+            stopping: Box::new(Settled { max_iterations, step_tolerance_m, ..Settled::default() }),
+            degeneracy: self.degeneracy,
+            prior_covariance: self.prior_covariance,
+            max_motion_sigma_m: self.max_motion_sigma_m,
+            min_correspondences: self.min_correspondences,
+        }
     }
 }

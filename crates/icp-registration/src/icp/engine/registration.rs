@@ -8,11 +8,9 @@ use crate::icp::engine::descent::{Alternative, Levels};
 use crate::icp::engine::matching::Points;
 use crate::icp::engine::quality::verdict;
 use crate::icp::starts::Starts;
-use crate::kernel::RobustKernel;
 use crate::parts::{
-    AllPoints, ErrorMetric, GaussNewton, KernelSchedule, MaxNormalAngle, Minimiser, Moment, NearestPoint,
-    PairRejection, PairWeighting, PointMatching, PointSelection, PointToPlane, Progress, Scene, Settled, SigmaWeight,
-    StoppingRule,
+    ErrorMetric, KernelSchedule, Minimiser, Moment, NearestPoint, PairRejection, PairWeighting, PointMatching,
+    PointSelection, Progress, Scene, StoppingRule,
 };
 use crate::quality::Residuals;
 use crate::result::DegeneracyPolicy;
@@ -21,7 +19,7 @@ use crate::system::System;
 use crate::target::IcpTarget;
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
-use rigid_pose::{InputError, require_pose};
+use rigid_pose::{InputError, motion_length, require_pose};
 
 /// An ICP registration of which every part can be replaced: the stages of `[RusinkiewiczLevoy2001]`.
 ///
@@ -65,31 +63,12 @@ pub struct Registration<'a> {
 impl<'a> Registration<'a> {
     /// Point to plane with the given matching, and the defaults of [`IcpOptions`].
     pub fn new(matching: impl PointMatching + 'a) -> Self {
-        let angle = std::f64::consts::FRAC_PI_4;
-        Self {
-            selection: Box::new(AllPoints),
-            matching: Box::new(matching),
-            rejection: vec![Box::new(MaxNormalAngle(angle))],
-            weighting: vec![Box::new(SigmaWeight)],
-            metric: Box::new(PointToPlane),
-            minimisation: Box::new(GaussNewton),
-            kernel: Box::new(RobustKernel::Welsch),
-            levels: Levels::default(),
-            starts: Some(Starts::default()),
-            alternatives: Alternative::usual(RobustKernel::Huber, Some(angle), None),
-            stopping: Box::new(Settled::default()),
-            degeneracy: DegeneracyPolicy::Report,
-            prior_covariance: None,
-            max_motion_sigma_m: None,
-            min_correspondences: 20,
-        }
+        IcpOptions::default().with_matching(matching)
     }
 
     /// The parts that stand for the options of the easy tier.
     pub fn with_options(target: &'a IcpTarget, options: &IcpOptions) -> Self {
-        let mut registration = Self::new(NearestPoint::new(target));
-        options.apply(&mut registration);
-        registration
+        options.with_matching(NearestPoint::new(target))
     }
 
     /// Aligns `source` with the target of the matching, starting at `guess` (both poses `target_from_source`). Normals of
@@ -119,6 +98,7 @@ impl<'a> Registration<'a> {
 }
 
 /// The parts at work on two surfaces.
+#[derive(Clone, Copy)]
 pub(crate) struct Engine<'p> {
     pub parts: &'p Registration<'p>,
     pub scene: Scene<'p>,
@@ -173,7 +153,7 @@ impl<'p> Engine<'p> {
         while track.iterations < self.parts.stopping.max_iterations() {
             let moment = track.moment(limits, limits.len() - 1, lengths.len());
             let step = self.step(track, &moment, points)?;
-            lengths.push(length(&step));
+            lengths.push(motion_length(&step));
             // While the kernel narrows, small steps mean nothing.
             if self.kernel.at(&moment).1 > 1.0 {
                 continue;
@@ -195,7 +175,7 @@ impl<'p> Engine<'p> {
         let system = System::new(&scene, self.metric, &pairs, self.kernel.at(moment));
         let mut step = self.parts.minimisation.step(&system, &self.held(&system)?)?;
         // Pairs at most `limit` apart give no reason to move farther than a few times that.
-        let excess = length(&step) / (2.0 * moment.limit_m);
+        let excess = motion_length(&step) / (2.0 * moment.limit_m);
         if excess > 1.0 {
             step /= excess;
         }
@@ -228,9 +208,4 @@ impl<'p> Engine<'p> {
     pub(crate) fn max_motion_sigma_m(&self) -> f64 {
         self.parts.max_motion_sigma_m.unwrap_or(self.scene.target.radius_m / 300.0)
     }
-}
-
-/// Larger of the two parts of a motion.
-pub(crate) fn length(motion: &Vector6<f64>) -> f64 {
-    motion.fixed_rows::<3>(0).norm().max(motion.fixed_rows::<3>(3).norm())
 }

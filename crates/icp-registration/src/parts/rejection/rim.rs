@@ -47,7 +47,7 @@ impl MutualNearest {
     /// For a registration of `source`.
     ///
     /// # Errors
-    /// [`InputError::Empty`], [`InputError::NonFinite`] for its points.
+    /// [`InputError::Empty`](rigid_pose::InputError::Empty), [`InputError::NonFinite`](rigid_pose::InputError::NonFinite) for its points.
     pub fn new(source: &Cloud, tolerance_m: f64) -> Result<Self> {
         Ok(Self { tree: NeighbourTree::new(&source.points)?, points: source.points.clone(), tolerance_m })
     }

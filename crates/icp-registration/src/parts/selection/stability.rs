@@ -1,14 +1,12 @@
 //! Selection of the points that hold the pose.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3};
 
 use super::PointSelection;
 use crate::error::Result;
 use crate::parts::scene::Scene;
-use rigid_pose::{eigen6, require_count, symmetrised};
-
-/// Share of the best held motion below which a motion is held by rounding only.
-const UNHELD: f64 = 1e-9;
+use crate::quality::ROUNDING;
+use rigid_pose::{Centred, eigen6, require_count, symmetrised};
 
 /// About this many points, chosen such that all six motions are held as evenly as the surface allows
 /// `[Gelfand2003]`: the next point is always one that holds the motion held least so far. Points without a normal are
@@ -38,19 +36,15 @@ fn holds(points: &[(usize, Vector3<f64>, Vector3<f64>)]) -> Result<Vec<[f64; 6]>
     let n = points.len() as f64;
     let centre = points.iter().fold(Vector3::zeros(), |sum, (_, p, _)| sum + p / n);
     let radius = (points.iter().map(|(_, p, _)| (p - centre).norm_squared() / n).sum::<f64>()).sqrt();
-    let arm = radius.max(f64::MIN_POSITIVE.sqrt());
-    let jacobian = |p: &Vector3<f64>, normal: &Vector3<f64>| {
-        let turn = ((p - centre) / arm).cross(normal);
-        Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z)
-    };
+    let frame = Centred { centre, radius_m: radius.max(f64::MIN_POSITIVE.sqrt()) };
     let mut information = Matrix6::zeros();
     for (_, p, normal) in points {
-        let j = jacobian(p, normal);
+        let j = frame.derivative(p, normal);
         information += j * j.transpose() / n;
     }
     let (_, vectors) = eigen6(&symmetrised(&information), "the stability of the surface")?;
     let squares = |(_, p, normal): &(usize, Vector3<f64>, Vector3<f64>)| {
-        let along = vectors.tr_mul(&jacobian(p, normal));
+        let along = vectors.tr_mul(&frame.derivative(p, normal));
         std::array::from_fn(|k| along[k].powi(2))
     };
     Ok(points.iter().map(squares).collect())
@@ -67,7 +61,7 @@ fn greedy(holds: &[[f64; 6]], wanted: usize) -> Vec<usize> {
     let total: [f64; 6] = std::array::from_fn(|motion| holds.iter().map(|hold| hold[motion]).sum());
     let largest = total.iter().copied().fold(0.0, f64::max);
     // Motions that no point holds would take all that are asked for.
-    let holdable: Vec<usize> = (0..6).filter(|&motion| total[motion] > UNHELD * largest).collect();
+    let holdable: Vec<usize> = (0..6).filter(|&motion| total[motion] > ROUNDING * largest).collect();
     let (mut next, mut held, mut taken) = ([0; 6], [0.0; 6], vec![false; holds.len()]);
     let mut chosen = Vec::with_capacity(wanted);
     while chosen.len() < wanted {

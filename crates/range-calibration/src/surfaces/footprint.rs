@@ -8,14 +8,13 @@
 //!
 //! With `q = n·e` for a surface's normal n and rays e, ranges are `D/q`, and light from beside the lens on a dull surface comes back as
 //! `q/ρ² ~ q³`. The mean over a pixel of width one is `1 + Σ (−2 (q'/q)² − q''/(2q)) / 12` times the range at its centre, summed over
-//! columns and rows.
+//! columns and rows. Range errors that change with the range are those of all these ranges in their mean.
 
 use camera_model::Camera;
-use nalgebra::Vector3;
 use range_image::{Flags, RangeFrame};
 use statistics::mad_scale;
 
-use super::local_planes::LocalPlanes;
+use super::local_planes::{LocalPlane, LocalPlanes};
 
 /// Variance of a place drawn from all of a pixel, pixel widths squared.
 const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
@@ -29,11 +28,15 @@ const LEAST_SCALE: f64 = 0.1;
 /// Standard deviation of a range of which none is stated, metre: their scale is found.
 const UNKNOWN_M: f64 = 0.01;
 
-/// The pixels of a frame: what their width does.
-pub(super) struct Footprints {
-    /// Part of the range by which it is changed, zero where no surface is found; NaN where the surface is seen edge-on, or the pixel's
-    /// patch may go over an edge.
-    pub(super) parts: Vec<f32>,
+/// What a pixel sees.
+#[derive(Clone, Copy)]
+pub(super) struct Footprint {
+    /// Range of the surface about it over its own: nearly without its noise. One where no surface is found.
+    pub(super) range: f64,
+    /// Part of the range by which its width changes it; zero where no surface is found.
+    pub(super) part: f64,
+    /// Standard deviation of the ranges that the pixel sees, part of the range.
+    pub(super) spread: f64,
 }
 
 /// A frame with its camera and points (NaN where none takes part).
@@ -45,7 +48,8 @@ pub(super) struct Surfaced<'a> {
 }
 
 impl Surfaced<'_> {
-    pub(super) fn footprints(&self) -> Footprints {
+    /// One a pixel; `None` where the surface is seen edge-on, or the pixel's patch may go over an edge.
+    pub(super) fn footprints(&self) -> Vec<Option<Footprint>> {
         let beside: Vec<[f64; 4]> = (0..self.points.len()).map(|index| self.beside(index)).collect();
         let mut known: Vec<f64> =
             beside.iter().flatten().map(|value| value.abs()).filter(|value| value.is_finite()).collect();
@@ -53,11 +57,11 @@ impl Surfaced<'_> {
         let scale = mad_scale(&mut known).max(LEAST_SCALE);
         let is_beside = |found: &[f64; 4]| found.iter().any(|value| value.abs() > BESIDE * scale);
         let planes = LocalPlanes::new(*self, scale);
-        let part = |(index, found): (usize, &[f64; 4])| {
+        let footprint = |(index, found): (usize, &[f64; 4])| {
             let at_edge = is_beside(found) || self.is_beside_mixed(index);
-            if at_edge { f32::NAN } else { self.part(index, planes.normal(index)) as f32 }
+            if at_edge { None } else { self.footprint(index, planes.about(index)) }
         };
-        Footprints { parts: beside.iter().enumerate().map(part).collect() }
+        beside.iter().enumerate().map(footprint).collect()
     }
 
     /// Standard deviation of a pixel's range, metre.
@@ -66,21 +70,24 @@ impl Surfaced<'_> {
         if sigma > 0.0 && sigma.is_finite() { sigma } else { UNKNOWN_M }
     }
 
-    /// Part of its range by which a pixel's is changed that sees a surface with this normal.
-    fn part(&self, index: usize, normal: Option<Vector3<f64>>) -> f64 {
+    /// What a pixel sees of the surface about it; `None` where it is seen edge-on.
+    fn footprint(&self, index: usize, surface: Option<LocalPlane>) -> Option<Footprint> {
         // A few pixels on narrow things; they tell where the station stands.
-        let Some(normal) = normal else { return 0.0 };
+        let Some(LocalPlane { normal, range }) = surface else {
+            return Some(Footprint { range: 1.0, part: 0.0, spread: 0.0 });
+        };
         let width = self.frame.width();
         let (col, row) = ((index % width) as f64, (index / width) as f64);
         let q = |cols: f64, rows: f64| normal.dot(&self.camera.ray([col + cols, row + rows]));
         let centre = q(0.0, 0.0);
         let along = |cols: f64, rows: f64| {
             let [before, after] = [q(-cols, -rows), q(cols, rows)];
-            let (first, second) = ((after - before) / 2.0 / centre, (after - 2.0 * centre + before) / centre);
-            -2.0 * first * first - second / 2.0
+            [(after - before) / 2.0 / centre, f64::midpoint(before, after) / centre - 1.0]
         };
-        let part = PIXEL_VARIANCE * (along(1.0, 0.0) + along(0.0, 1.0));
-        if part.abs() <= LARGEST { part } else { f64::NAN }
+        let [[by_col, bent_by_col], [by_row, bent_by_row]] = [along(1.0, 0.0), along(0.0, 1.0)];
+        let slope = by_col * by_col + by_row * by_row;
+        let part = -PIXEL_VARIANCE * (2.0 * slope + bent_by_col + bent_by_row);
+        (part.abs() <= LARGEST).then(|| Footprint { range, part, spread: (PIXEL_VARIANCE * slope).sqrt() })
     }
 
     /// Distances of a pixel from the lines between opposite neighbours, in standard deviations; NaN where it has none.
@@ -117,6 +124,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use camera_model::{InteriorOrientation, LensDistortion};
+    use nalgebra::Vector3;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
     use range_image::{ImageFormat, Raster};
@@ -153,20 +161,24 @@ mod tests {
         let (camera, normal) = (camera(), Vector3::new(0.1, 0.95, 0.3).normalize());
         let (col, row) = (20, 6);
         let surfaced = Surfaced { camera: &camera, frame: &frame(0.005), points: &[] };
-        let part = surfaced.part(row * WIDTH + col, Some(normal));
-        let (mut sum, mut light) = (0.0, 0.0);
+        let surface = LocalPlane { normal, range: 1.0 };
+        let Footprint { part, spread, .. } = surfaced.footprint(row * WIDTH + col, Some(surface)).unwrap();
+        let (mut sum, mut squares, mut light) = (0.0, 0.0, 0.0);
         for index in 0..3600 {
             let place = [index % 60, index / 60].map(|k| (f64::from(k) + 0.5) / 60.0 - 0.5);
             let ray = camera.ray([col as f64 + place[0], row as f64 + place[1]]);
             let range_m = range(&normal, 1.4, &ray);
             let returned = normal.dot(&ray).abs() / range_m.powi(2);
             sum += returned * range_m;
+            squares += returned * range_m * range_m;
             light += returned;
         }
         let centre = range(&normal, 1.4, &camera.ray([col as f64, row as f64]));
         let expected = sum / light / centre - 1.0;
         // Fourth orders of a pixel's width: a part of (q'/q)², which is below a hundredth here.
         assert!(expected < -1e-4 && (part / expected - 1.0).abs() < 0.02, "{part} {expected}");
+        let scatter = (squares / light - (sum / light).powi(2)).sqrt() / centre;
+        assert!(scatter > 1e-3 && (spread / scatter - 1.0).abs() < 0.02, "{spread} {scatter}");
     }
 
     #[test]
@@ -186,13 +198,25 @@ mod tests {
             exact.push(range_m);
         }
         let surfaced = Surfaced { camera: &camera, frame: &frame, points: &points };
-        let found = surfaced.footprints().parts;
-        let on_floor = (0..found.len()).filter(|&index| exact[index].is_some() && !found[index].is_nan());
-        let parts: Vec<[f64; 2]> =
-            on_floor.map(|index| [f64::from(found[index]), surfaced.part(index, Some(normal))]).collect();
+        let found = surfaced.footprints();
+        let on_floor = (0..found.len()).filter(|&index| exact[index].is_some());
+        let surface = LocalPlane { normal, range: 1.0 };
+        let both = |index: usize| Some([found[index]?.part, surfaced.footprint(index, Some(surface))?.part]);
+        let parts: Vec<[f64; 2]> = on_floor.filter_map(both).collect();
         let [sum, expected] = [0, 1].map(|k| parts.iter().map(|part| part[k]).sum::<f64>());
         assert!(parts.len() > 300 && (sum / expected - 1.0).abs() < 0.02, "{}: {sum}, {expected}", parts.len());
         assert!(parts.iter().all(|[part, exact]| (part / exact - 1.0).abs() < 0.5));
+        // The surface about a pixel has a range of less noise than its own.
+        let squares = |smooth: bool| {
+            let off = |index: usize| {
+                let own = Vector3::from(points[index]).norm();
+                Some(own * if smooth { found[index]?.range } else { 1.0 } - exact[index]?)
+            };
+            let all: Vec<f64> = (0..found.len()).filter_map(off).map(|off| off * off).collect();
+            (all.iter().sum::<f64>() / all.len() as f64).sqrt()
+        };
+        let [own, surface] = [squares(false), squares(true)];
+        assert!((own / sigma_m - 1.0).abs() < 0.1 && surface < 0.4 * own, "{own} {surface}");
     }
 
     #[test]
@@ -207,8 +231,8 @@ mod tests {
             points.push((ray * if index % WIDTH < 30 { range_m } else { 1.5 / -ray.z }).into());
         }
         let seen = |sigma: f32| Surfaced { camera: &camera, frame: &frame(sigma), points: &points }.footprints();
-        let columns = |found: &Footprints| -> Vec<usize> {
-            (0..WIDTH).filter(|col| found.parts[15 * WIDTH + col].is_nan()).collect()
+        let columns = |found: &[Option<Footprint>]| -> Vec<usize> {
+            (0..WIDTH).filter(|col| found[15 * WIDTH + col].is_none()).collect()
         };
         let found = columns(&seen(0.004));
         assert!(found.contains(&20) && found.contains(&29) && found.contains(&30), "{found:?}");

@@ -16,6 +16,15 @@ const FEWEST: usize = 5;
 /// Standard deviations of the sum of squares beyond which a window holds more than a plane: by chance, one window in a thousand does.
 const ROUGH: f64 = 3.1;
 
+/// The plane through the pixels about one.
+#[derive(Clone, Copy)]
+pub(super) struct LocalPlane {
+    /// Unit normal.
+    pub(super) normal: Vector3<f64>,
+    /// Range of the plane along the pixel's ray over the pixel's own.
+    pub(super) range: f64,
+}
+
 /// Fits planes about the pixels of a frame.
 pub(super) struct LocalPlanes<'a> {
     surfaced: Surfaced<'a>,
@@ -37,22 +46,22 @@ impl<'a> LocalPlanes<'a> {
         Self { surfaced, directions, scale: scale * scale }
     }
 
-    /// Unit normal of the surface that a pixel sees; `None` where too few pixels tell.
-    pub(super) fn normal(&self, index: usize) -> Option<Vector3<f64>> {
+    /// The surface that a pixel sees; `None` where too few pixels tell.
+    pub(super) fn about(&self, index: usize) -> Option<LocalPlane> {
         let mut found = None;
         for half_width in HALF_WIDTHS {
-            let Some((normal, is_plane)) = self.plane(index, half_width) else { continue };
-            found = Some(normal);
+            let Some((plane, is_plane)) = self.plane(index, half_width) else { continue };
             if is_plane {
-                break;
+                return Some(plane);
             }
+            // No window holds a plane alone: the smallest one is nearest to what the pixel sees, but its own range is nearer.
+            found = Some(LocalPlane { range: 1.0, ..plane });
         }
-        // No window holds a plane alone: the smallest one is nearest to what the pixel sees.
         found
     }
 
     /// The plane through a window, and whether it holds nothing else.
-    fn plane(&self, index: usize, half_width: isize) -> Option<(Vector3<f64>, bool)> {
+    fn plane(&self, index: usize, half_width: isize) -> Option<(LocalPlane, bool)> {
         let (mut normal_matrix, mut right, mut squares, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0.0, 0);
         for (at, inverse, weight) in self.window(index, half_width) {
             let offset = self.directions[at] - self.directions[index];
@@ -70,7 +79,8 @@ impl<'a> LocalPlanes<'a> {
         let left = (squares - plane.dot(&right)) / self.scale;
         let middle = plane.x - plane.yz().dot(&self.directions[index]);
         let normal = Vector3::new(plane.y, plane.z, -middle).try_normalize(0.0)?;
-        Some((normal, left <= free + ROUGH * (2.0 * free).sqrt()))
+        let found = LocalPlane { normal, range: 1.0 / plane.x };
+        Some((found, left <= free + ROUGH * (2.0 * free).sqrt()))
     }
 
     /// The known pixels of a window with their inverse depths, relative to that of the pixel in the middle, and weights.

@@ -71,22 +71,24 @@ impl StationPixels {
         let values = model.parameter_values();
         let [xp, yp] = camera.interior.principal_point_mm;
         let mut kept = Self { columns: known.columns.len(), ..Self::default() };
-        let mut row = vec![0.0; model.parameter_count()];
+        let mut rows = Rows::new(model);
         for (index, point) in points.iter_mut().enumerate().filter(|(_, point)| !point[0].is_nan()) {
-            if footprints.parts[index].is_nan() {
+            let Some(footprint) = footprints[index] else {
                 *point = [f64::NAN; 3];
                 continue;
-            }
+            };
             let place = (index % width, index / width);
             let pixel = [place.0 as f64, place.1 as f64];
             let [x, y] = camera.format.image_from_pixel(pixel);
             let (range, amplitude) = (f64::from(frame.range[place]), frame.amplitude[place]);
-            model.design_row_into(range, x - xp, y - yp, &mut row)?;
+            let measured_m = Vector3::from(*point).norm();
+            let of_surface_m = range + (footprint.range - 1.0) * measured_m;
+            let spread_m = footprint.spread * of_surface_m;
+            let (row, change_m) = rows.mean(range, of_surface_m, spread_m, [x - xp, y - yp])?;
             let asked: f64 = known.columns.iter().map(|&column| row[column] * values[column]).sum();
             let by_amplitude = model.hyperbola.filter(|_| known.amplitude);
             let by_amplitude = by_amplitude.and_then(|hyperbola| hyperbola.correction(f64::from(amplitude)));
-            let (ray, corrected) = (camera.ray(pixel), Vector3::from(*point).norm());
-            let at_centre = corrected / (1.0 + f64::from(footprints.parts[index]));
+            let (ray, at_centre) = (camera.ray(pixel), (measured_m - change_m) / (1.0 + footprint.part));
             *point = (ray * at_centre).into();
             kept.pixels.push([place.0 as f32, place.1 as f32]);
             kept.rays.push(ray);
@@ -105,6 +107,41 @@ impl StationPixels {
     /// Design row of a pixel.
     pub(super) fn row(&self, index: usize) -> &[f32] {
         &self.rows[index * self.columns..(index + 1) * self.columns]
+    }
+}
+
+/// Design rows of a model's terms, as pixels have them.
+struct Rows<'a> {
+    model: &'a RangeErrorModel,
+    values: Vec<f64>,
+    /// At a pixel's own range; at both ends of what it sees; in the mean.
+    own: Vec<f64>,
+    ends: [Vec<f64>; 2],
+    mean: Vec<f64>,
+}
+
+impl<'a> Rows<'a> {
+    fn new(model: &'a RangeErrorModel) -> Self {
+        let row = || vec![0.0; model.parameter_count()];
+        Self { model, values: model.parameter_values(), own: row(), ends: [row(), row()], mean: row() }
+    }
+
+    /// The row of a pixel, and by how much the model's correction is more with it than at the pixel's own range, metre.
+    ///
+    /// It is taken at the range of the surface about the pixel: at its own, row and range would err together, which bends what is
+    /// estimated. And it is the mean over the ranges that the pixel sees, which scatter by `spread_m`: terms that bend with the range,
+    /// `f`, are `f + f'' s²/2` there.
+    fn mean(&mut self, own_m: f64, of_surface_m: f64, spread_m: f64, [x_mm, y_mm]: [f64; 2]) -> Result<(&[f64], f64)> {
+        self.model.design_row_into(own_m, x_mm, y_mm, &mut self.own)?;
+        for (row, end_m) in self.ends.iter_mut().zip([of_surface_m - spread_m, of_surface_m + spread_m]) {
+            self.model.design_row_into(end_m, x_mm, y_mm, row)?;
+        }
+        let mut change_m = 0.0;
+        for (at, value) in self.values.iter().enumerate() {
+            self.mean[at] = f64::midpoint(self.ends[0][at], self.ends[1][at]);
+            change_m += (self.mean[at] - self.own[at]) * value;
+        }
+        Ok((&self.mean, change_m))
     }
 }
 
@@ -155,4 +192,35 @@ fn farthest(capture: &SurfaceCapture<'_>, options: &SurfaceCalibrationOptions<'_
         return Err(Error::NotInMetre { station: capture.name.to_owned(), median_m, limit_m: LONGEST_RANGE_M });
     }
     Ok(WILD * quantile(&mut ranges, 1.0 - WILD_PART))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use error_models::RangeTerms;
+
+    use super::*;
+
+    #[test]
+    fn a_row_is_the_mean_over_the_ranges_that_a_pixel_sees() {
+        let terms = RangeTerms::from_array([0.01, 0.004, -0.006, 0.003, 0.002, 0.008, -0.005, 0.0, 0.0]);
+        let model = RangeErrorModel { terms, ..RangeErrorModel::error_free(5.0) };
+        let (own_m, of_surface_m, spread_m, count) = (3.03, 3.0, 0.03, 1000);
+        let mut rows = Rows::new(&model);
+        let (row, change_m) = rows.mean(own_m, of_surface_m, spread_m, [1.0, -2.0]).unwrap();
+        // Evenly over the pixel: root of three deviations to either side.
+        let at = |k: usize| of_surface_m + spread_m * 3.0_f64.sqrt() * ((2 * k + 1) as f64 / count as f64 - 1.0);
+        let mut expected = vec![0.0; row.len()];
+        for k in 0..count {
+            let one = model.design_row(at(k), 1.0, -2.0);
+            expected.iter_mut().zip(one).for_each(|(sum, value)| *sum += value / count as f64);
+        }
+        let own = model.design_row(own_m, 1.0, -2.0);
+        // The shortest wave is weaker by a hundredth; fourth orders are left.
+        assert!(row.iter().zip(&expected).all(|(found, mean)| (found - mean).abs() < 2e-5), "{row:?} {expected:?}");
+        let values = model.parameter_values();
+        let change: f64 = expected.iter().zip(&own).zip(&values).map(|((mean, own), value)| (mean - own) * value).sum();
+        assert!(change.abs() > 5e-4 && (change_m - change).abs() < 1e-6, "{change_m} {change}");
+    }
 }

@@ -20,9 +20,6 @@ use crate::register::{Registered, describe, frames, pairs};
 /// A difference between two stations' surfaces in expected standard deviations beyond which it is doubtful.
 const LARGEST_SIGMAS: f64 = 5.0;
 
-/// Standard deviation of unit weight beyond which surfaces differ by more than the noise of their points: 0.9 to 1.1 on simulated
-/// surveys.
-const MOST_OVER_NOISE: f64 = 2.0;
 /// Loops of sound pairs close to within this many times the typical distance of common surfaces.
 const LOOSE_LOOP: f64 = 20.0;
 
@@ -30,8 +27,8 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     let Input { stations, vertical_axis, turns, .. } = input;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
     let is_depth_alone = stations.iter().all(Station::is_depth_alone);
-    // Clouds do not know what neighbours of a depth camera err by together: frames that belong to no other are named, not forced.
-    if let Some(result) = is_depth_alone.then(|| frames::found(&stations, before.as_deref())).flatten() {
+    let mut as_frames = is_depth_alone.then(|| frames::found(&stations, before.as_deref())).flatten();
+    if let Some(result) = as_frames.take_if(|found| found.unplaced.is_empty()) {
         return frames::registered(stations, before, vertical_axis, &result);
     }
     let clouds_with = |windows: Windows| {
@@ -62,12 +59,11 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
         },
         found => (found, tried, words),
     };
-    // Errors that neighbouring points share, as those of structured light, are no noise of surfaces; pairs know them.
-    let misfits = found.as_ref().map_or(true, |found| found.sigma0.is_some_and(|sigma0| sigma0 > MOST_OVER_NOISE));
-    if misfits
-        && !is_depth_alone
-        && let Some(result) = frames::found(&stations, before.as_deref())
-    {
+    let misfits = !found.as_ref().is_ok_and(StationRegistration::fits_noise);
+    if misfits && !is_depth_alone {
+        as_frames = frames::found(&stations, before.as_deref());
+    }
+    if let Some(result) = as_frames.filter(|_| misfits) {
         return frames::registered(stations, before, vertical_axis, &result);
     }
     let result = found.map_err(|error| refused::of_command(&error, &names, tried))?;

@@ -1,5 +1,5 @@
 use multiview_registration::rigid_pose::Uncertain;
-use multiview_registration::{FrameRegistration, PlacedFrame, Start};
+use multiview_registration::{FrameRegistration, PlacedFrame, Start, StationRegistration};
 use nalgebra::Isometry3;
 
 use crate::stages::Findings;
@@ -53,8 +53,8 @@ fn at_once(
     progress: &dyn Progress,
 ) -> Result<Joined> {
     let before = if let Start::Poses(poses) = start { Some(poses) } else { None };
-    // Clouds do not know what neighbours of a depth camera err by together: frames that belong to no other are named, not forced.
-    if let Some(found) = (frames.len() == clouds.len()).then(|| register_as_frames(&frames, before).ok()).flatten() {
+    let mut as_frames = (frames.len() == clouds.len()).then(|| register_as_frames(&frames, before).ok()).flatten();
+    if let Some(found) = as_frames.take_if(|found| found.unplaced.is_empty()) {
         return Ok(from_frames(found, &all_stated, names));
     }
     let limits = Some((options.minimum_overlap, options.maximum_distance_m));
@@ -64,6 +64,10 @@ fn at_once(
         Start::Nothing => Tried::AllPairs,
     };
     let found = register_at_once(&clouds, start, limits, &[], progress);
+    // Not all belong together, or not as clouds: those that do are brought together.
+    if let Some(frames) = as_frames.filter(|_| !found.as_ref().is_ok_and(StationRegistration::fits_noise)) {
+        return Ok(from_frames(frames, &all_stated, names));
+    }
     let found = found.map_err(|error| refused::of_stage("Register", error, &names, tried))?;
     let world = world(stated, found.world_from_station.first());
     let (registered, pairs, refused) = Registered::new(found, &world, options.minimum_overlap);

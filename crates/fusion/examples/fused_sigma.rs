@@ -17,6 +17,8 @@ struct Counts {
     points: usize,
     contradictions: usize,
     apart: usize,
+    /// Surfels of which frames are said to disagree.
+    disagree: usize,
     unfused: [usize; 4],
     seconds: f64,
 }
@@ -26,6 +28,7 @@ impl Counts {
         self.points += fused.surfel_of_point.len();
         self.contradictions += fused.contradictions.len();
         self.apart += fused.apart.len();
+        self.disagree += fused.surfels.iter().filter(|surfel| surfel.variance_factor > 1.0).count();
         self.seconds += seconds;
         for left in &fused.unfused {
             let at = match left.reason {
@@ -69,7 +72,10 @@ fn print(judged: &Judgement, counts: &Counts) {
         "{} points, {} surfels, {} of them nowhere; {:.1} s",
         counts.points, judged.surfels, judged.ghosts, counts.seconds
     );
-    println!("contradictions of surfels {}, stations apart {}", counts.contradictions, counts.apart);
+    println!(
+        "contradictions of surfels {}, stations apart {}, surfels of which frames disagree {}",
+        counts.contradictions, counts.apart, counts.disagree
+    );
     println!("points contradict {contradict:.3} %, between {between:.2} %, at edges {edge:.2} %, alone {alone:.2} %");
     println!("{:<14} {:>9} {:>16}", "class", "surfels", "error²/variance");
     for (class, (sum, count)) in &judged.classes {

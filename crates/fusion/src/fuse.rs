@@ -5,7 +5,7 @@ use point_uncertainty::{CommonErrors, PointErrors, Shares, Source};
 use rayon::prelude::*;
 use statistics::upper_median;
 
-use crate::common::{self, Conditioned, Row, condition, form, split, without_shared};
+use crate::common::{self, Conditioned, Row, Squares, condition, form, split, variance_factors, without_shared};
 use crate::input::{Observation, Observations, Registered};
 use crate::options::{CommonErrorUse, FusionOptions};
 use crate::outcome::{Fused, Surfel};
@@ -111,19 +111,29 @@ impl Task<'_> {
         let mut bends = bends(&gathered.seeds, &gathered.estimates, options.voxel_m);
         give_up_uneven(&mut gathered, &mut bends, options);
         nonempty(&gathered, observations)?;
-        let rows: Vec<Row> = gathered
+        let (rows, squares): (Vec<Row>, Vec<Squares>) = gathered
             .estimates
             .par_iter()
             .with_min_len(64)
-            .map(|place| Ok(common::mean(place, &common::rows(place, &observations.all, errors, common)?)))
-            .collect::<Result<_>>()?;
+            .map(|place| {
+                let rows = common::rows(place, &observations.all, errors, common)?;
+                Ok((common::mean(place, &rows), Squares::new(place, &rows, common)?))
+            })
+            .collect::<Result<Vec<_>>>()?
+            .into_iter()
+            .unzip();
+        let factors = variance_factors(&gathered, &squares);
         let surfels: Vec<Surfel> = (0..rows.len())
             .into_par_iter()
             .with_min_len(64)
             .map(|at| {
                 let place = &gathered.estimates[at];
                 let amplitude = amplitude(input, &gathered.members[at], observations);
-                surfel(place, options.voxel_m, bends[at], shares(place, &rows[at], common), amplitude)
+                Surfel {
+                    amplitude,
+                    variance_factor: factors[at],
+                    ..surfel(place, options.voxel_m, bends[at], shares(place, &rows[at], common))
+                }
             })
             .collect();
         let scene = Scene::new(&surfels, input.centres);
@@ -146,18 +156,19 @@ impl Task<'_> {
     }
 }
 
-fn surfel(place: &Estimate, voxel_m: f64, bend: Bend, shares: Shares, amplitude: f64) -> Surfel {
+fn surfel(place: &Estimate, voxel_m: f64, bend: Bend, shares: Shares) -> Surfel {
     let mut frames: Vec<u32> = place.frames.iter().map(|frame| frame.frame).collect();
     frames.sort_unstable();
     Surfel {
         position: place.position - place.normal * bend.above_m,
         normal: place.normal,
         radius_m: place.radius_m(voxel_m),
-        amplitude,
+        amplitude: f64::NAN,
         points: place.count,
         frames,
         shares,
         shape_variance: bend.variance,
+        variance_factor: 1.0,
     }
 }
 

@@ -25,12 +25,20 @@ pub struct Surfel {
     pub shares: Shares,
     /// Variance of what a bent surface differs from the plane through its points, square metre.
     pub shape_variance: f64,
+    /// By how many times the variance of all sources is larger than stated, since frames disagree here by so much more than they should;
+    /// 1 where they do not.
+    pub variance_factor: f64,
 }
 
 impl Surfel {
     /// Standard deviation of its height along the normal, from all sources, metre.
     pub fn sigma_m(&self) -> f64 {
-        (self.shares.variance() + self.shape_variance).sqrt()
+        (self.shares.variance() + self.disagreement_variance() + self.shape_variance).sqrt()
+    }
+
+    /// What the disagreement of frames adds to the variance that the sources state, square metre.
+    pub fn disagreement_variance(&self) -> f64 {
+        (self.variance_factor - 1.0) * self.shares.variance()
     }
 }
 
@@ -164,7 +172,8 @@ impl PointErrors for Fused {
     fn noise(&self, point: usize) -> Matrix3<f64> {
         let surfel = &self.surfels[point];
         let shared = if self.strongest[point].0 == NO_NEIGHBOURHOOD { 0.0 } else { self.strongest[point].1.powi(2) };
-        let own = surfel.shares.of(Source::Noise) + surfel.shares.of(Source::Sensor) + surfel.shape_variance;
+        let beside = surfel.disagreement_variance() + surfel.shape_variance;
+        let own = surfel.shares.of(Source::Noise) + surfel.shares.of(Source::Sensor) + beside;
         surfel.normal * surfel.normal.transpose() * (own - shared).max(0.0)
     }
 

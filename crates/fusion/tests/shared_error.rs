@@ -1,7 +1,7 @@
 //! Frames that a sensor bends alike: walls as thin as their noise, and standard deviations that hold.
 
 use fusion::nalgebra::{Matrix3, Vector3};
-use fusion::{Error, Fused, FusionOptions, fuse};
+use fusion::{Error, Fused, FusionOptions, Surfel, fuse};
 use statistics::robust_standard_deviation;
 
 use crate::common::bent::Bent;
@@ -12,19 +12,18 @@ fn options(bent: &Bent, is_looked_for: bool) -> FusionOptions {
 
 /// Scatter of fused points about the planes of wall and floor over their standard deviations, and that of the points about the mean of their
 /// fused point, over their noise.
-fn scatter(bent: &Bent, fused: &Fused) -> [f64; 2] {
+fn scatter(bent: &Bent, fused: &Fused, sigma_m: fn(&Surfel) -> f64) -> [f64; 2] {
     let mut all = Vec::new();
     for (at, normal) in [(2.0, -Vector3::y()), (0.0, Vector3::z())] {
         let offset = |position: &Vector3<f64>| normal.dot(position) - if normal.z > 0.5 { at } else { -at };
-        let near =
-            |surfel: &&fusion::Surfel| surfel.normal.dot(&normal) > 0.9 && offset(&surfel.position.coords).abs() < 0.1;
+        let near = |surfel: &&Surfel| surfel.normal.dot(&normal) > 0.9 && offset(&surfel.position.coords).abs() < 0.1;
         let rows: Vec<(Vector3<f64>, f64, f64)> = fused
             .surfels
             .iter()
             .filter(near)
             .map(|surfel| {
                 let aside = [surfel.position.x, if normal.z > 0.5 { surfel.position.y } else { surfel.position.z }];
-                (Vector3::new(1.0, aside[0], aside[1]), offset(&surfel.position.coords), surfel.sigma_m())
+                (Vector3::new(1.0, aside[0], aside[1]), offset(&surfel.position.coords), sigma_m(surfel))
             })
             .collect();
         assert!(rows.len() > 200, "{}", rows.len());
@@ -72,8 +71,12 @@ fn what_all_frames_bend_alike_is_taken_off() {
     // Without it, frames see parts of the walls so far apart that these stand twice.
     let [before, after] = [plain.surfels.len() as f64, fused.surfels.len() as f64];
     assert!(before > 1.1 * after, "{before} {after}");
+    let by_sources = |surfel: &Surfel| (surfel.shares.variance() + surfel.shape_variance).sqrt();
     let [[sigma_before, thickness_before], [sigma_after, thickness_after]] =
-        [scatter(&bent, &plain), scatter(&bent, &fused)];
+        [scatter(&bent, &plain, by_sources), scatter(&bent, &fused, by_sources)];
+    // The frames tell that something is missing.
+    let [told_before, _] = scatter(&bent, &plain, Surfel::sigma_m);
+    assert!((0.8..1.3).contains(&told_before), "{told_before}");
     // Too small before. After, deviations have in them what whole walls err by with the poses, which is no scatter.
     assert!(sigma_before > 1.5 && (0.4..1.0).contains(&sigma_after), "{sigma_before} {sigma_after}");
     assert!(thickness_before > 1.1 && (0.75..1.1).contains(&thickness_after), "{thickness_before} {thickness_after}");

@@ -1,7 +1,8 @@
 //! Errors of fused points against what is said of them.
 
-use fusion::point_uncertainty::{Source, shares};
-use fusion::{CommonErrorUse, FusionOptions, fuse};
+use fusion::nalgebra::{Matrix3, Vector3};
+use fusion::point_uncertainty::{PointErrors, Source, shares};
+use fusion::{CommonErrorUse, FusionOptions, Surfel, fuse};
 
 use crate::common::judge::Judgement;
 use crate::common::survey::{Plan, Survey};
@@ -28,6 +29,47 @@ fn fused_points_err_as_they_say() {
     let thickness = statistics::quantile(&mut judged.thickness, 0.5);
     assert!((0.8..1.2).contains(&thickness), "{thickness}");
     assert!(judged.ghosts * 1000 < judged.surfels, "{} of {}", judged.ghosts, judged.surfels);
+}
+
+/// The survey, with half of the standard deviations of noise and neighbourhoods.
+struct Understated<'a>(&'a Survey);
+
+impl PointErrors for Understated<'_> {
+    fn noise(&self, point: usize) -> Matrix3<f64> {
+        self.0.noise(point) * 0.25
+    }
+
+    fn sensor(&self, point: usize) -> Option<(u64, Vector3<f64>)> {
+        self.0.sensor(point).map(|(neighbourhood, shift)| (neighbourhood, shift * 0.5))
+    }
+
+    fn common(&self, point: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
+        self.0.common(point, derivatives);
+    }
+}
+
+#[test]
+fn where_frames_disagree_beyond_what_is_stated_sigma_says_so() {
+    // Poses are known, so that what frames disagree by is what is not stated.
+    let plan = Plan { d0_m: 1e-5, lens_mm: 1e-4, pose_m: 1e-5, pose_rad: 1e-5, ..Plan::default() };
+    let (mut told, mut untold, mut disagree, mut seen) = (Vec::new(), Vec::new(), 0, 0);
+    for seed in 120..122 {
+        let survey = Survey::new(&plan, seed);
+        let options = FusionOptions { common_errors: CommonErrorUse::AsStated, ..FusionOptions::default() };
+        let fused = |errors: &dyn PointErrors| fuse(&survey.registered(), errors, &survey.common, &options).unwrap();
+        let is_disputed = |surfel: &&Surfel| surfel.variance_factor > 1.0;
+        let honest = fused(&survey);
+        disagree += honest.surfels.iter().filter(is_disputed).count();
+        seen += honest.surfels.len();
+        for surfel in fused(&Understated(&survey)).surfels.iter().filter(is_disputed) {
+            let Some((height, _)) = survey.scene.above(&surfel.position, &surfel.normal) else { continue };
+            told.push((height / surfel.sigma_m()).powi(2));
+            untold.push(height.powi(2) / (surfel.shares.variance() + surfel.shape_variance));
+        }
+    }
+    let mean = |squares: &[f64]| squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!((0.8..1.3).contains(&mean(&told)) && mean(&untold) > 1.6, "{} {}", mean(&told), mean(&untold));
+    assert!(disagree * 100 < seen, "{disagree} of {seen}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use report::{
 use statistics::quantile;
 
 use super::input::Usable;
-use super::summarise::{SHAPE, mean_shares};
+use super::summarise::{DISAGREEMENT, SHAPE, mean_shares};
 
 /// Places that are looked at for a section.
 const CANDIDATES: usize = 50;
@@ -78,7 +78,7 @@ fn shares(surfels: &[Surfel]) -> Figure {
     };
     let most = surfels.iter().map(|surfel| surfel.frames.len()).max().unwrap_or(1).clamp(1, MOST_FRAMES);
     let mut canvas = Canvas::new(&axes, CHART_SIZE, [0.5, most as f64 + 0.5], [0.0, 100.0]);
-    let names: Vec<&str> = Source::ALL.into_iter().map(Source::name).chain([SHAPE]).collect();
+    let names: Vec<&str> = Source::ALL.into_iter().map(Source::name).chain([DISAGREEMENT, SHAPE]).collect();
     let of = |frames: usize| surfels.iter().filter(move |surfel| surfel.frames.len().clamp(1, MOST_FRAMES) == frames);
     let means: Vec<_> = (1..=most).map(|frames| (frames, mean_shares(of(frames)))).collect();
     // The tallest first: each next one covers it from below.

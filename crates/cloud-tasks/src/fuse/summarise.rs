@@ -108,11 +108,13 @@ fn contradictions(all: &[Contradiction], views: &[String]) -> Vec<ContradictionS
 
 /// Name of what a bent surface adds to a variance, among the sources.
 pub(crate) const SHAPE: &str = "shape";
+/// Name of what frames disagree by beyond what the sources state.
+pub(crate) const DISAGREEMENT: &str = "disagreement";
 
-/// The parts of a fused point's variance: by source, and what its shape adds.
+/// The parts of a fused point's variance: by source, and what disagreement and its shape add.
 pub(crate) fn parts(surfel: &Surfel) -> Vec<(&'static str, f64)> {
     let sources = Source::ALL.into_iter().map(|source| (source.name(), surfel.shares.of(source)));
-    sources.chain([(SHAPE, surfel.shape_variance)]).collect()
+    sources.chain([(DISAGREEMENT, surfel.disagreement_variance()), (SHAPE, surfel.shape_variance)]).collect()
 }
 
 /// Means of the parts in shares of their variances.
@@ -200,6 +202,21 @@ fn findings(summary: &mut FuseSummary, fused: &Fused, is_depth_camera: bool) {
             "{share:.0} % of the fused points were seen by one frame only: nothing could contradict them."
         ));
     }
+    summary.findings.extend(disagreement(fused));
+}
+
+/// Where frames disagree by more than what is stated of them, at more than one of a hundred fused points.
+fn disagreement(fused: &Fused) -> Option<String> {
+    let factors = fused.surfels.iter().map(|surfel| surfel.variance_factor).filter(|factor| *factor > 1.0);
+    let mut larger: Vec<f64> = factors.map(f64::sqrt).collect();
+    let share = 100.0 * larger.len() as f64 / fused.surfels.len() as f64;
+    (share >= 1.0).then(|| {
+        let factor = quantile(&mut larger, 0.5);
+        format!(
+            "At {share:.0} % of the fused points frames disagree beyond what is stated of their errors: the standard deviations there are \
+             larger, {factor:.1} times in the median."
+        )
+    })
 }
 
 fn doubts(summary: &mut FuseSummary) {

@@ -103,7 +103,8 @@ pub struct SigmaSummary {
     pub median_m: f64,
     /// Nineteen of twenty are below, metre.
     pub below_95_m: f64,
-    /// Mean shares of the variance: by source, and `shape` for surfaces that are bent. They add up to one.
+    /// Mean shares of the variance: by source, `disagreement` for what frames differ by beyond what the sources state, and `shape` for
+    /// surfaces that are bent. They add up to one.
     pub shares: BTreeMap<&'static str, f64>,
 }
 

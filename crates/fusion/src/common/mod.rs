@@ -1,5 +1,6 @@
 //! Errors that many points have in common, as surfaces that several frames see show them.
 
+mod disagreement;
 mod equations;
 mod isolate;
 mod posterior;
@@ -7,6 +8,7 @@ mod rows;
 mod shared_error;
 mod split;
 
+pub(crate) use disagreement::{Squares, variance_factors};
 pub(crate) use isolate::{Conditioned, condition};
 pub(crate) use rows::{Row, form, mean, rows};
 pub(crate) use shared_error::without_shared;

@@ -3,7 +3,7 @@ use crate::common::{Pinhole, pose_error};
 use crate::depth_frames::dense_kitchen;
 use crate::sequence::{around, frame_at, projection};
 use multiview_registration::{FrameRegistration, Start, register_frames};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use projective_registration::{FrameAlignmentOptions, OrganisedFrame};
 
 fn camera() -> Pinhole {
@@ -50,6 +50,22 @@ fn frames_come_together_from_their_order() {
     check(&found, &truth, None);
     // The first frame shares enough with the second one only.
     assert!(found.unchecked.iter().all(|pair| pair.frames == [0]), "{:?}", found.unchecked);
+}
+
+#[test]
+fn frames_come_together_from_start_poses_that_err_by_more_than_they_show() {
+    // Every second frame: neighbours share half of what they see, and start poses hide most of that.
+    let (frames, truth) = room(|_| ());
+    let few: Vec<OrganisedFrame> = frames[1..].iter().step_by(2).cloned().collect();
+    let truth: Vec<Isometry3<f64>> = truth[1..].iter().step_by(2).map(|pose| truth[1].inverse() * pose).collect();
+    let sides = [[0.0; 3], [0.1, -0.06, 0.05], [-0.09, 0.08, -0.05]];
+    let start: Vec<Isometry3<f64>> = truth
+        .iter()
+        .zip(sides)
+        .map(|(pose, [x, y, z])| pose * Isometry3::new(Vector3::new(x, y, z), Vector3::new(y, z, x) * 0.5))
+        .collect();
+    let found = register_frames(&few, Start::Poses(&start), &FrameAlignmentOptions::default(), &|_, _| {}).unwrap();
+    check(&found, &truth, None);
 }
 
 #[test]

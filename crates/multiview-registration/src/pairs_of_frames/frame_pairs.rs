@@ -25,8 +25,8 @@ pub(crate) struct Candidate {
 pub(crate) enum Guess {
     /// Near the pose.
     Near(Isometry3<f64>),
-    /// From no motion, and a search around it.
-    NoMotion,
+    /// From the pose, and a search around it.
+    Around(Isometry3<f64>),
     /// Where features tell.
     Features,
 }
@@ -92,8 +92,7 @@ impl<'a> Frames<'a> {
     fn align(&self, aligner: &mut FrameAligner, candidate: &Candidate) -> std::result::Result<FramePair, String> {
         let Candidate { target, source, guess } = *candidate;
         let guess = match guess {
-            Guess::Near(pose) => pose,
-            Guess::NoMotion => Isometry3::identity(),
+            Guess::Near(pose) | Guess::Around(pose) => pose,
             Guess::Features => self.guess(target, source)?,
         };
         let (onto, moved) = (&self.all[target], &self.all[source]);

@@ -18,6 +18,11 @@ use rigid_pose::InputError;
 
 /// Share of a frame that another must be expected to see for the two to be aligned.
 const LEAST_OVERLAP: f64 = 0.3;
+/// By how much surfaces may stand apart at start poses, share of the depth: poses that err by 5 cm and 2 degrees an axis move them by some
+/// 0.05 against each other at 2 m. Larger ones only try more pairs.
+const START_ERROR: f32 = 0.15;
+/// As [`LEAST_OVERLAP`], at start poses: their errors hide up to half of what two frames share.
+const START_OVERLAP: f64 = 0.15;
 /// Pairs of a frame that are tried, those with the most overlap.
 const PARTNERS: usize = 6;
 /// Frames after each that it is tried with where the order is known.
@@ -207,11 +212,12 @@ impl<'a> Survey<'a> {
     /// Pairs that the start tells.
     fn first(&self) -> Vec<Candidate> {
         match self.start {
-            Start::Poses(poses) => self.overlapping(|a, b| Some(poses[a].inverse() * poses[b])),
+            Start::Poses(poses) => self
+                .overlapping((START_ERROR, START_OVERLAP), Guess::Around, |a, b| Some(poses[a].inverse() * poses[b])),
             _ => (0..self.count())
                 .flat_map(|target| (1..=FOLLOWING).map(move |step| (target, target + step)))
                 .filter(|(_, source)| *source < self.count())
-                .map(|(target, source)| Candidate { target, source, guess: Guess::NoMotion })
+                .map(|(target, source)| Candidate { target, source, guess: Guess::Around(Isometry3::identity()) })
                 .collect(),
         }
     }
@@ -223,19 +229,25 @@ impl<'a> Survey<'a> {
             let tried = self.tried.contains(&(a, b)) || self.pairs.iter().any(|pair| pair.joins(a, b));
             (!tried).then_some(pose)
         };
-        self.overlapping(open)
+        self.overlapping((Agreement::LARGEST_ERROR, LEAST_OVERLAP), Guess::Near, open)
     }
 
-    /// For each frame the pairs with the most overlap, at poses `a_from_b`.
-    fn overlapping(&self, pose: impl Fn(usize, usize) -> Option<Isometry3<f64>>) -> Vec<Candidate> {
+    /// For each frame the pairs with the most overlap, at poses `a_from_b`, where surfaces lie within an error, a part of the depth, on
+    /// the least share of the frame.
+    fn overlapping(
+        &self,
+        (error, least): (f32, f64),
+        guess: fn(Isometry3<f64>) -> Guess,
+        pose: impl Fn(usize, usize) -> Option<Isometry3<f64>>,
+    ) -> Vec<Candidate> {
         let frames = self.frames.all;
         let mut found = Vec::new();
         for target in 0..self.count() {
             for source in target + 1..self.count() {
                 let Some(pose) = pose(target, source) else { continue };
-                let overlap = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4);
-                if overlap >= LEAST_OVERLAP {
-                    found.push((overlap, Candidate { target, source, guess: Guess::Near(pose) }));
+                let overlap = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4, error);
+                if overlap >= least {
+                    found.push((overlap, Candidate { target, source, guess: guess(pose) }));
                 }
             }
         }

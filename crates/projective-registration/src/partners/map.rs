@@ -15,9 +15,6 @@ use crate::preparation::grid::BLOCK;
 pub(crate) const AGREEING_SIGMA: f32 = 4.0;
 /// What maps and poses are wrong by beside the noise: this share of the depth.
 const AGREEING_SHARE: f32 = 0.005;
-/// Largest systematic error, share of the depth: 6 cm at 2 m, several times that of a Kinect. With 0.02 and 0.05 its paths are
-/// as far off within a millimetre or two, and those of simulated frames the same.
-const LARGEST_ERROR: f32 = 0.03;
 /// Frames that a plane remembers: later ones keep this weight, so that a keyframe does not stiffen.
 const MEMORY: f32 = 16.0;
 /// Logarithm of the largest factor between depths that are told apart.
@@ -35,6 +32,9 @@ pub struct Agreement {
 }
 
 impl Agreement {
+    /// Largest systematic error of a sensor, share of the depth: 6 cm at 2 m, several times that of a Kinect. With 0.02 and 0.05 its paths are
+    /// as far off within a millimetre or two, and those of simulated frames the same.
+    pub const LARGEST_ERROR: f32 = 0.03;
     /// Nodes by which agreement is judged: its shares are then good to a hundredth.
     pub const NODES: usize = 2500;
     /// Fraction of what can be judged that must agree where a pose has to be trusted by that alone.
@@ -72,13 +72,14 @@ impl OrganisedFrame {
         agreement
     }
 
-    /// Fraction of about `most` nodes of `source` that may lie on the surfaces of this one, measured with systematic errors.
-    pub fn nearness(&self, source: &Self, self_from_source: &Isometry3<f64>, most: usize) -> f64 {
+    /// Fraction of about `most` nodes of `source` that may lie on the surfaces of this one, where errors of sensor and pose are up to `error`, a
+    /// part of the depth.
+    pub fn nearness(&self, source: &Self, self_from_source: &Isometry3<f64>, most: usize, error: f32) -> f64 {
         let stride = source.stride_for(most);
         let (mut points, mut near) = (0_usize, 0_usize);
         let count = |partner: Option<Partner>| {
             points += 1;
-            near += usize::from(partner.is_some_and(|p| p.may_be_the_same()));
+            near += usize::from(partner.is_some_and(|p| p.lies_within(error)));
         };
         with_locate(self, Partners { target: self, source, pose: self_from_source, stride, each: count });
         near as f64 / points.max(1) as f64
@@ -214,7 +215,12 @@ impl Partner {
 
     /// Whether it may be the same surface, measured with a systematic error.
     pub(crate) fn may_be_the_same(&self) -> bool {
-        self.residual.abs() <= AGREEING_SIGMA * self.variance.sqrt() - LARGEST_ERROR * self.point[2]
+        self.lies_within(Agreement::LARGEST_ERROR)
+    }
+
+    /// Whether it lies on the plane but for an error, a part of the depth, and its surface runs along it.
+    fn lies_within(&self, error: f32) -> bool {
+        self.residual.abs() <= AGREEING_SIGMA * self.variance.sqrt() - error * self.point[2]
             && self.cosine >= SAME_SURFACE_COSINE as f32
     }
 

@@ -15,8 +15,10 @@ impl Tracker {
         }
         let joined: Vec<bool> = (0..=new).map(|k| k == new || self.keyframes.graph.joined(k, new)).collect();
         let others = |k: usize| !joined[k];
-        let candidates =
-            self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, OrganisedFrame::nearness);
+        let near = |keyframe: &OrganisedFrame, current: &OrganisedFrame, pose: &Isometry3<f64>, most| {
+            keyframe.nearness(current, pose, most, Agreement::LARGEST_ERROR)
+        };
+        let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, near);
         let mut closing = Vec::new();
         for (overlap, k) in candidates.into_iter().take(self.options.loop_attempts) {
             if overlap < Agreement::LEAST_OVERLAP {

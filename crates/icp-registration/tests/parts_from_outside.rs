@@ -4,15 +4,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common::{Pinhole, Scene as Room, cloud, disturbance, look_at, pose_error};
 use icp_registration::parts::{
-    ErrorMetric, KernelSchedule, Minimiser, Moment, Pair, PairRejection, PairWeighting, Partner, PointMatching,
-    PointSelection, Progress, Query, Row, Rows, Scene, StoppingRule, TargetSurface,
+    ErrorMetric, Minimiser, Pair, PairRejection, PairWeighting, Partner, PointMatching, PointSelection, Query, Row, Rows,
+    Scene, TargetSurface,
 };
-use icp_registration::{IcpTarget, Registration, RobustKernel, StopReason, System};
+use icp_registration::{IcpTarget, Registration, System};
 use nalgebra::{Matrix6, Vector6};
 
 /// Calls of each part.
 #[derive(Default)]
-struct Calls([AtomicUsize; 8]);
+struct Calls([AtomicUsize; 6]);
 
 impl Calls {
     fn count(&self, part: usize) {
@@ -111,32 +111,6 @@ impl Minimiser for Cholesky<'_> {
     }
 }
 
-/// Least squares first, Tukey's kernel in the last level.
-struct LateTukey<'a>(&'a Calls);
-
-impl KernelSchedule for LateTukey<'_> {
-    fn at(&self, moment: &Moment) -> (RobustKernel, f64) {
-        self.0.count(6);
-        let last = moment.level + 1 == moment.levels;
-        (if last { RobustKernel::Tukey } else { RobustKernel::None }, 1.0)
-    }
-}
-
-struct SmallSteps<'a>(&'a Calls);
-
-impl StoppingRule for SmallSteps<'_> {
-    fn max_iterations(&self) -> usize {
-        80
-    }
-
-    fn decide(&self, progress: &mut Progress<'_>) -> Result<Option<StopReason>, icp_registration::Error> {
-        self.0.count(7);
-        let small = progress.step_lengths_m.last().is_some_and(|step| *step < 2e-5);
-        let done = small && progress.step_over_sigma()? < 0.2;
-        Ok(done.then_some(StopReason::Converged))
-    }
-}
-
 #[test]
 fn every_part_can_come_from_outside() {
     let (a, b) = (look_at([-1.5, -1.0, 1.4], [2.0, 0.8, 0.8]), look_at([-1.0, -1.2, 1.2], [1.6, 1.4, 0.9]));
@@ -151,8 +125,6 @@ fn every_part_can_come_from_outside() {
         rejection: vec![Box::new(NotTooFar(&calls))],
         metric: Box::new(PlaneToPoint(&calls)),
         minimisation: Box::new(Cholesky(&calls)),
-        kernel: Box::new(LateTukey(&calls)),
-        stopping: Box::new(SmallSteps(&calls)),
         alternatives: Vec::new(),
         ..Registration::new(NearestPlane(&calls, &target))
     };

@@ -128,7 +128,7 @@ impl Engine<'_> {
         let moved = moved.coords;
         let turned = pose.rotation * scene.source_normals[source];
         let limit_m = scene.moment.limit_m;
-        let query = Query { source, moved, normal: turned, pose, limit_m, remember: memory.is_some() };
+        let query = Query { source, moved, normal: turned, limit_m, remember: memory.is_some() };
         let partner = self.ask(&query, memory);
         if !partner.found {
             return Ok(());

@@ -23,11 +23,11 @@ impl Engine<'_> {
         &self,
         track: &Track,
         points: &mut Points,
-        limits: &[f64],
+        limit_m: f64,
         guess: &Isometry3<f64>,
         stop: StopReason,
     ) -> Result<IcpResult> {
-        let moment = Moment { ended: true, ..track.moment(limits, limits.len() - 1, 0) };
+        let moment = Moment { ended: true, ..track.moment(limit_m) };
         let scene = self.scene.at(moment);
         let gated = self.gated_pairs(&scene, points)?;
         let overlap = if points.indices.len() == scene.source.len() {
@@ -36,10 +36,10 @@ impl Engine<'_> {
             self.overlap(&scene)?
         };
         let pairs = self.enough(&scene, gated, points, track.iterations)?;
-        let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&moment));
+        let system = System::new(&scene, self.metric, &pairs, self.kernel);
         let verdict = verdict(&system, self.max_motion_sigma_m(), Residuals::Settled)?;
         let sample = thinned(&points.indices, RESPONSE_POINTS);
-        let step_m = (0.5 * system.rms_m()).max(0.01 * moment.limit_m);
+        let step_m = (0.5 * system.rms_m()).max(0.01 * limit_m);
         let response = sensitivity(self, &system, &sample, step_m)?;
         let mut result = IcpResult {
             target_from_source: track.pose,
@@ -49,7 +49,7 @@ impl Engine<'_> {
             iterations: track.iterations,
             stop,
             correspondences: pairs.len(),
-            max_correspondence_distance_m: moment.limit_m,
+            max_correspondence_distance_m: limit_m,
             degenerate: verdict.undetermined(),
         };
         if let (DegeneracyPolicy::HoldAtPrior, Some(prior)) = (self.parts.degeneracy, &self.parts.prior_covariance) {

@@ -1,13 +1,33 @@
-//! The pose from the pairs at once.
+//! How the weighted squares of the residuals are made small.
 
 use nalgebra::{Point3, Vector6};
-
-use super::Minimiser;
-use crate::error::{Error, Result};
-use crate::parts::ErrorMetric;
-use crate::parts::scene::Scene;
-use crate::system::System;
 use rigid_pose::{Centred, RotationMethod, absolute_orientation_by, free_of};
+
+use super::ErrorMetric;
+use crate::error::{Error, Result};
+use crate::system::System;
+
+/// Finds a motion for fixed pairs.
+pub trait Minimiser: Sync {
+    /// The motion `[dt, rho w]` in [`System::frame`] (about its centre in target axes, rotation vector times its radius: all
+    /// six in metre) that makes the sum of squares of the system smaller, without a part along the orthonormal `held`.
+    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>>;
+
+    /// Refuses metrics that it cannot minimise.
+    fn validate(&self, _metric: &dyn ErrorMetric) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// One solution of the 6x6 normal equations, with weights as they are: no step along motions without information.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct GaussNewton;
+
+impl Minimiser for GaussNewton {
+    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
+        Ok(system.normal_equations().step(&free_of(held), 0.0)?)
+    }
+}
 
 /// Closed-form absolute orientation `[Eggert1997]` of the weighted pairs; for the point-to-point metric only.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -28,7 +48,7 @@ impl Minimiser for ClosedForm {
         Ok(free_of(held) * Vector6::new(dt.x, dt.y, dt.z, w.x, w.y, w.z))
     }
 
-    fn validate(&self, _: &Scene<'_>, metric: &dyn ErrorMetric) -> Result<()> {
+    fn validate(&self, metric: &dyn ErrorMetric) -> Result<()> {
         if metric.is_point_to_point() {
             return Ok(());
         }

@@ -49,6 +49,11 @@ impl<'a> System<'a> {
         system
     }
 
+    /// With motions told in another frame.
+    pub(crate) fn in_frame(self, frame: Option<Centred>) -> Self {
+        Self { frame: frame.unwrap_or(self.frame), ..self }
+    }
+
     /// The same frame, scale and kernel with other pairs: what the score would be had the pose been a little different.
     pub(crate) fn with_pairs(&self, scene: &'a Scene<'a>, pairs: &'a [Pair]) -> Self {
         let mut system = Self { scene, pairs, lengths: Vec::new(), ..*self };

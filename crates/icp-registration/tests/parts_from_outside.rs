@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common::{Pinhole, Scene as Room, cloud, disturbance, look_at, pose_error};
 use icp_registration::parts::{
-    ErrorMetric, Minimiser, Pair, PairRejection, PairWeighting, Partner, PointMatching, PointSelection, Query, Row, Rows,
-    Scene, TargetSurface,
+    ErrorMetric, Minimiser, Pair, PairRejection, PairWeighting, Partner, PointMatching, PointSelection, Query, Row,
+    Rows, Scene, TargetSurface,
 };
 use icp_registration::{IcpTarget, Registration, System};
 use nalgebra::{Matrix6, Vector6};
@@ -102,7 +102,7 @@ impl ErrorMetric for PlaneToPoint<'_> {
 struct Cholesky<'a>(&'a Calls);
 
 impl Minimiser for Cholesky<'_> {
-    fn step(&self, system: &System<'_>, _held: &[Vector6<f64>]) -> Result<Vector6<f64>, icp_registration::Error> {
+    fn step(&self, system: &System<'_>, _free: &Matrix6<f64>) -> Result<Vector6<f64>, icp_registration::Error> {
         self.0.count(5);
         let equations = system.normal_equations();
         let matrix = equations.matrix + Matrix6::identity() * (1e-12 * equations.matrix.trace());

@@ -1,7 +1,7 @@
 //! How the weighted squares of the residuals are made small.
 
-use nalgebra::{Point3, Vector6};
-use rigid_pose::{Centred, RotationMethod, absolute_orientation_by, free_of};
+use nalgebra::{Matrix6, Point3, Vector6};
+use rigid_pose::{Centred, RotationMethod, absolute_orientation_by};
 
 use super::ErrorMetric;
 use crate::error::{Error, Result};
@@ -10,8 +10,8 @@ use crate::system::System;
 /// Finds a motion for fixed pairs.
 pub trait Minimiser: Sync {
     /// The motion `[dt, rho w]` in [`System::frame`] (about its centre in target axes, rotation vector times its radius: all
-    /// six in metre) that makes the sum of squares of the system smaller, without a part along the orthonormal `held`.
-    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>>;
+    /// six in metre) that makes the sum of squares of the system smaller, among those that are `free` (a projection).
+    fn step(&self, system: &System<'_>, free: &Matrix6<f64>) -> Result<Vector6<f64>>;
 
     /// Refuses metrics that it cannot minimise.
     fn validate(&self, _metric: &dyn ErrorMetric) -> Result<()> {
@@ -24,8 +24,8 @@ pub trait Minimiser: Sync {
 pub struct GaussNewton;
 
 impl Minimiser for GaussNewton {
-    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
-        Ok(system.normal_equations().step(&free_of(held), 0.0)?)
+    fn step(&self, system: &System<'_>, free: &Matrix6<f64>) -> Result<Vector6<f64>> {
+        Ok(system.normal_equations().step(free, 0.0)?)
     }
 }
 
@@ -34,7 +34,7 @@ impl Minimiser for GaussNewton {
 pub struct ClosedForm(pub RotationMethod);
 
 impl Minimiser for ClosedForm {
-    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
+    fn step(&self, system: &System<'_>, free: &Matrix6<f64>) -> Result<Vector6<f64>> {
         // About the centre and in units of the radius: independent of where the clouds are and how large.
         let Centred { centre, radius_m: radius } = system.frame();
         let reduced = |v: &nalgebra::Vector3<f64>| Point3::from((v - centre) / radius);
@@ -45,7 +45,7 @@ impl Minimiser for ClosedForm {
         let relative: Vec<f64> = weights.iter().map(|w| w / largest).collect();
         let motion = absolute_orientation_by(self.0, &source, &target, Some(&relative))?.target_from_source;
         let (dt, w) = (motion.translation.vector * radius, motion.rotation.scaled_axis() * radius);
-        Ok(free_of(held) * Vector6::new(dt.x, dt.y, dt.z, w.x, w.y, w.z))
+        Ok(free * Vector6::new(dt.x, dt.y, dt.z, w.x, w.y, w.z))
     }
 
     fn validate(&self, metric: &dyn ErrorMetric) -> Result<()> {

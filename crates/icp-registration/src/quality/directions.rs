@@ -73,11 +73,6 @@ impl Directions {
         &self.all
     }
 
-    /// Orthonormal undetermined motions `[dt, rho w]`.
-    pub fn held(&self) -> impl Iterator<Item = Vector6<f64>> {
-        self.all.iter().filter(|d| !d.determined).map(|d| d.vector)
-    }
-
     /// Projection on the determined motions.
     pub fn free(&self) -> Matrix6<f64> {
         free_of(self.all.iter().filter(|d| !d.determined).map(|d| &d.vector))

@@ -1,6 +1,6 @@
 //! The registration of two clouds of voxels.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+use nalgebra::{Isometry3, Vector6};
 
 use super::cloud::VoxelCloud;
 use super::options::VoxelAlignmentOptions;
@@ -8,9 +8,9 @@ use super::pairs::{Matcher, Pair, Partners, System, matched};
 use super::wide::{RULES, Wide};
 use crate::error::Result;
 use crate::kernel::RobustKernel;
-use crate::quality::{Cells, Residuals, Verdict};
+use crate::quality::{Cells, Free, Verdict};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
-use rigid_pose::{Centred, InputError, free_of, motion_length, require_pose};
+use rigid_pose::{InputError, motion_length, require_pose};
 
 /// Partners of a level are not looked for anew when a step is below this fraction of its voxels, and after so many steps in any
 /// case: a coarse level ends then, in the finest one they are kept.
@@ -39,7 +39,7 @@ impl VoxelCloud {
         options.validate()?;
         require_pose("the guess", guess)?;
         let (pairs, scratch) = (Vec::new(), Vec::new());
-        let run = Run { target: self, source, options, pose: *guess, iterations: 0, held: None, pairs, scratch };
+        let run = Run { target: self, source, options, pose: *guess, iterations: 0, free: Free::all(), pairs, scratch };
         run.finish(guess)
     }
 }
@@ -50,8 +50,8 @@ struct Run<'a> {
     options: &'a VoxelAlignmentOptions,
     pose: Isometry3<f64>,
     iterations: usize,
-    /// Motions that stay as they are, in a frame that stays too.
-    held: Option<(Centred, Matrix6<f64>)>,
+    /// Motions that do not stay as they are, in a frame that stays.
+    free: Free,
     pairs: Vec<Pair>,
     scratch: Vec<f64>,
 }
@@ -65,7 +65,10 @@ impl<'a> Run<'a> {
         }
         let last = matchers[matchers.len() - 1];
         let mut stop = self.settle(last)?;
-        if self.options.degeneracy == DegeneracyPolicy::HoldAtGuess && self.return_to(guess, last)? {
+        if self.options.degeneracy == DegeneracyPolicy::HoldAtGuess
+            && let Some((pose, free)) = self.verdict(last)?.back_at(guess, &self.pose)
+        {
+            (self.pose, self.free) = (pose, free);
             stop = self.settle(last)?;
         }
         self.result(last, stop)
@@ -160,31 +163,12 @@ impl<'a> Run<'a> {
         Ok(StopReason::MaxIterations)
     }
 
-    /// Takes back what happened along undetermined motions, and holds them from now on; whether there are any.
-    ///
-    /// What a motion is worth shows at the answer only: far off, and between large voxels, everything seems to matter.
-    fn return_to(&mut self, guess: &Isometry3<f64>, matcher: Matcher<'_>) -> Result<bool> {
-        let (pose, iteration, kernel) = (self.pose, self.iterations, self.options.kernel);
-        let max_sigma_m = self.max_motion_sigma_m();
-        let system = self.enough(matcher, &pose, Partners::Anew, kernel, iteration)?;
-        let (frame, cells) = (system.frame, system.cells(matcher.target, cell(&system, matcher)));
-        let held = Verdict::new(&cells, max_sigma_m, Residuals::Settled)?.held();
-        let slide = (guess * pose.inverse() * Point3::from(frame.centre)).coords - frame.centre;
-        let turn = (guess.rotation * pose.rotation.inverse()).scaled_axis() * frame.radius_m;
-        let back = Vector6::new(slide.x, slide.y, slide.z, turn.x, turn.y, turn.z);
-        let free = free_of(&held);
-        let back = back - free * back;
-        self.pose = frame.moved(&pose, &back);
-        self.held = Some((frame, free));
-        Ok(!held.is_empty())
-    }
-
     fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<Vector6<f64>> {
-        let (pose, iteration, held) = (self.pose, self.iterations, self.held);
-        let mut system = self.enough(matcher, &pose, partners, kernel, iteration)?;
-        let (frame, free) = held.unwrap_or_else(|| (system.frame, Matrix6::identity()));
-        system.frame = frame;
-        let mut step = system.step(&free)?;
+        let (pose, free) = (self.pose, self.free);
+        let mut system = self.enough(matcher, partners, kernel)?;
+        system.frame = free.frame.unwrap_or(system.frame);
+        let frame = system.frame;
+        let mut step = system.step(&free.projection)?;
         // Partners give no reason to move farther than they can be apart.
         step /= (motion_length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
         self.pose = frame.moved(&pose, &step);
@@ -192,16 +176,9 @@ impl<'a> Run<'a> {
         Ok(step)
     }
 
-    fn enough(
-        &mut self,
-        matcher: Matcher<'_>,
-        pose: &Isometry3<f64>,
-        partners: Partners,
-        kernel: RobustKernel,
-        iteration: usize,
-    ) -> Result<System<'_>> {
-        let needed = self.options.min_correspondences;
-        let system = self.system(matcher, pose, partners, kernel);
+    fn enough(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<System<'_>> {
+        let (pose, iteration, needed) = (self.pose, self.iterations, self.options.min_correspondences);
+        let system = self.system(matcher, &pose, partners, kernel);
         if system.count < needed {
             let (found, of, max_distance_m) = (system.count, matcher.source.voxels.len(), matcher.limit_m());
             return Err(InputError::TooFewCorrespondences { found, of, needed, max_distance_m, iteration }.into());
@@ -209,35 +186,29 @@ impl<'a> Run<'a> {
         Ok(system)
     }
 
-    fn max_motion_sigma_m(&self) -> f64 {
-        self.options.max_motion_sigma_m.unwrap_or(self.target.radius_m / 300.0)
+    /// What the pairs of the pose say about it.
+    fn verdict(&mut self, matcher: Matcher<'_>) -> Result<Verdict> {
+        let max_sigma_m = self.options.max_motion_sigma_m.unwrap_or(self.target.radius_m / 300.0);
+        let system = self.enough(matcher, Partners::Anew, self.options.kernel)?;
+        let cell_m = (system.frame.radius_m / Cells::PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m);
+        Verdict::new(&system.cells(matcher.target, cell_m), max_sigma_m)
     }
 
     fn result(mut self, matcher: Matcher<'_>, stop: StopReason) -> Result<IcpResult> {
-        let (pose, iterations, max_sigma_m) = (self.pose, self.iterations, self.max_motion_sigma_m());
-        let (kernel, points) = (self.options.kernel, self.source.points as f64);
-        let system = self.enough(matcher, &pose, Partners::Anew, kernel, iterations)?;
-        let cells = system.cells(matcher.target, cell(&system, matcher));
-        let verdict = Verdict::new(&cells, max_sigma_m, Residuals::Settled)?;
-        let (rms_m, correspondences, degenerate) = (system.rms_m(), system.count, verdict.undetermined());
-        let covariance = verdict.covariance(&pose, None);
+        let verdict = self.verdict(matcher)?;
+        let system = System::new(&self.pairs, self.options.kernel, &mut self.scratch);
         let seen: f64 = matched(&self.pairs).map(|p| p.count).sum();
         Ok(IcpResult {
-            target_from_source: pose,
-            covariance,
+            target_from_source: self.pose,
+            covariance: verdict.covariance(&self.pose, None),
             // A voxel between two surfaces counts for both.
-            overlap: (seen / points).min(1.0),
-            rms_m,
-            iterations,
+            overlap: (seen / self.source.points as f64).min(1.0),
+            rms_m: system.rms_m(),
+            iterations: self.iterations,
             stop,
-            correspondences,
+            correspondences: system.count,
             max_correspondence_distance_m: matcher.limit_m(),
-            degenerate,
+            degenerate: verdict.undetermined(),
         })
     }
-}
-
-/// Size of the cubes whose pairs count as one observation, metre.
-fn cell(system: &System<'_>, matcher: Matcher<'_>) -> f64 {
-    (system.frame.radius_m / Cells::PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m)
 }

@@ -14,6 +14,7 @@ use crate::icp::engine::matching::Points;
 use crate::icp::engine::registration::{Engine, Track};
 use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
+use crate::quality::Free;
 use crate::system::System;
 
 /// Points whose distance at the guess is looked at.
@@ -148,7 +149,8 @@ impl<'p> Engine<'p> {
         let Some(starts) = self.parts.starts.filter(|_| self.parts.levels.first_limit_m.is_none()) else {
             return from_guess.map(|(_, track)| track);
         };
-        let share = from_guess.as_ref().map(|(_, track)| self.share_with_partner(selected, track, limits[limits.len() - 1]));
+        let share =
+            from_guess.as_ref().map(|(_, track)| self.share_with_partner(selected, track, limits[limits.len() - 1]));
         if share.is_ok_and(|share| share >= starts.convincing) {
             return from_guess.map(|(_, track)| track);
         }
@@ -188,7 +190,7 @@ impl<'p> Engine<'p> {
     }
 
     fn down(&self, sample: &[usize], guess: &Isometry3<f64>, limits: &[f64]) -> Result<Track> {
-        let mut track = Track { pose: *guess, iterations: 0 };
+        let mut track = Track { pose: *guess, iterations: 0, free: Free::all() };
         let mut points = Points::new(sample.to_vec());
         for limit_m in limits {
             for _ in 0..self.parts.levels.iterations {

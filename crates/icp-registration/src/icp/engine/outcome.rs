@@ -9,7 +9,6 @@ use crate::icp::engine::registration::{Engine, Track};
 use crate::icp::engine::sensitivity::sensitivity;
 use crate::icp::prior::fused_with_prior;
 use crate::parts::{Moment, Scene, thinned};
-use crate::quality::Residuals;
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::system::System;
 
@@ -37,7 +36,7 @@ impl Engine<'_> {
         };
         let pairs = self.enough(&scene, gated, points, track.iterations)?;
         let system = System::new(&scene, self.metric, &pairs, self.kernel);
-        let verdict = verdict(&system, self.max_motion_sigma_m(), Residuals::Settled)?;
+        let verdict = verdict(&system, self.max_motion_sigma_m())?;
         let sample = thinned(&points.indices, RESPONSE_POINTS);
         let step_m = (0.5 * system.rms_m()).max(0.01 * limit_m);
         let response = sensitivity(self, &system, &sample, step_m)?;

@@ -13,7 +13,7 @@ use crate::kernel::RobustKernel;
 use crate::parts::{
     ErrorMetric, Minimiser, Moment, NearestPoint, PairRejection, PairWeighting, PointMatching, PointSelection, Scene,
 };
-use crate::quality::Residuals;
+use crate::quality::{Free, Verdict};
 use crate::result::DegeneracyPolicy;
 use crate::result::{IcpResult, StopReason};
 use crate::system::System;
@@ -94,7 +94,15 @@ impl<'a> Registration<'a> {
         let mut track = engine.descend(&selected, guess, &limits)?;
         let mut points = Points::new(selected);
         let last_limit_m = limits[limits.len() - 1];
-        let stop = engine.settle(&mut track, &mut points, last_limit_m)?;
+        let mut stop = engine.settle(&mut track, &mut points, last_limit_m)?;
+        if self.degeneracy != DegeneracyPolicy::Report {
+            let moment = Moment { ended: true, ..track.moment(last_limit_m) };
+            let verdict = engine.verdict(&moment, &mut points, track.iterations)?;
+            if let Some((pose, free)) = verdict.back_at(guess, &track.pose) {
+                (track.pose, track.free) = (pose, free);
+                stop = engine.settle(&mut track, &mut points, last_limit_m)?;
+            }
+        }
         engine.result(&track, &mut points, last_limit_m, guess, stop)
     }
 }
@@ -114,6 +122,7 @@ pub(crate) struct Engine<'p> {
 pub(crate) struct Track {
     pub pose: Isometry3<f64>,
     pub iterations: usize,
+    pub free: Free,
 }
 
 impl Track {
@@ -160,10 +169,11 @@ impl<'p> Engine<'p> {
             if motion_length(&step) <= tolerance_m {
                 return Ok(StopReason::Converged);
             }
-            if stopping.no_longer_shrink(&lengths)
-                && self.step_over_sigma(track, limit_m, points, &step)? <= stopping.noise_fraction
-            {
-                return Ok(StopReason::WithinNoise);
+            if stopping.no_longer_shrink(&lengths) {
+                let verdict = self.verdict(&track.moment(limit_m), points, track.iterations)?;
+                if verdict.over_sigma(&step) <= stopping.noise_fraction {
+                    return Ok(StopReason::WithinNoise);
+                }
             }
         }
         Ok(StopReason::MaxIterations)
@@ -173,8 +183,8 @@ impl<'p> Engine<'p> {
     pub(crate) fn step(&self, track: &mut Track, moment: &Moment, points: &mut Points) -> Result<Vector6<f64>> {
         let pairs = self.pairs(moment, points, track.iterations)?;
         let scene = self.scene.at(*moment);
-        let system = System::new(&scene, self.metric, &pairs, self.kernel);
-        let mut step = self.parts.minimisation.step(&system, &self.held(&system)?)?;
+        let system = System::new(&scene, self.metric, &pairs, self.kernel).in_frame(track.free.frame);
+        let mut step = self.parts.minimisation.step(&system, &track.free.projection)?;
         // Pairs at most `limit` apart give no reason to move farther than a few times that.
         let excess = motion_length(&step) / (2.0 * moment.limit_m);
         if excess > 1.0 {
@@ -188,23 +198,11 @@ impl<'p> Engine<'p> {
         Ok(step)
     }
 
-    /// Motions that are not to be taken.
-    fn held(&self, system: &System<'_>) -> Result<Vec<Vector6<f64>>> {
-        match self.parts.degeneracy {
-            DegeneracyPolicy::Report => Ok(Vec::new()),
-            DegeneracyPolicy::HoldAtGuess | DegeneracyPolicy::HoldAtPrior => {
-                Ok(verdict(system, self.max_motion_sigma_m(), Residuals::Misaligned)?.held())
-            }
-        }
-    }
-
-    /// The last step over the standard deviation of the pose, along the determined motion where it is largest.
-    fn step_over_sigma(&self, track: &Track, limit_m: f64, points: &mut Points, step: &Vector6<f64>) -> Result<f64> {
-        let moment = track.moment(limit_m);
-        let pairs = self.pairs(&moment, points, track.iterations)?;
-        let scene = self.scene.at(moment);
-        let system = System::new(&scene, self.metric, &pairs, self.kernel);
-        Ok(verdict(&system, self.max_motion_sigma_m(), Residuals::Settled)?.over_sigma(step))
+    /// What the pairs of a moment say about its pose.
+    fn verdict(&self, moment: &Moment, points: &mut Points, iterations: usize) -> Result<Verdict> {
+        let pairs = self.pairs(moment, points, iterations)?;
+        let scene = self.scene.at(*moment);
+        verdict(&System::new(&scene, self.metric, &pairs, self.kernel), self.max_motion_sigma_m())
     }
 
     pub(crate) fn max_motion_sigma_m(&self) -> f64 {

@@ -1,5 +1,7 @@
 //! What was seen from the viewpoint: ranges by direction on the six faces of a cube.
 
+use statistics::upper_median;
+
 use crate::description::fpfh::{dot, subtract};
 
 /// Most cells along the edge of a face.
@@ -44,10 +46,8 @@ pub(crate) struct View {
 
 impl View {
     /// Map of `points` seen from `eye`, with cells of about `spacing` at the median range.
-    pub(crate) fn new(points: &[[f32; 3]], eye: [f32; 3], spacing: f32, tolerance: f32) -> Option<Self> {
-        let mut ranges: Vec<f32> = points.iter().map(|p| length(subtract(*p, eye))).collect();
-        let half = ranges.len() / 2;
-        let median = *ranges.get_mut(..)?.select_nth_unstable_by(half, f32::total_cmp).1;
+    pub(crate) fn new(points: &[[f32; 3]], eye: [f32; 3], spacing: f32, tolerance: f32) -> Self {
+        let median = upper_median(&mut points.iter().map(|p| length(subtract(*p, eye))).collect::<Vec<f32>>());
         let edge = (2.0 * median / spacing).clamp(1.0, MOST) as usize;
         let cells = 6 * edge * edge;
         let mut view = Self { eye, edge, nearest: vec![f32::INFINITY; cells], farthest: vec![0.0; cells], tolerance };
@@ -58,7 +58,7 @@ impl View {
         }
         let faces = view.nearest.chunks_exact(edge * edge);
         view.nearest = faces.flat_map(|face| least_around(face, edge)).collect();
-        Some(view)
+        view
     }
 
     /// Whether a surface with this normal turns its back on the viewpoint.
@@ -116,5 +116,5 @@ pub(crate) fn least_around(cells: &[f32], edge: usize) -> Vec<f32> {
 }
 
 fn length(d: [f32; 3]) -> f32 {
-    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
+    dot(d, d).sqrt()
 }

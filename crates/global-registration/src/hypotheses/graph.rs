@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use crate::hypotheses::correspondences::{Correspondences, agree};
+use crate::hypotheses::correspondences::{Correspondences, Place, agree};
 
 /// Fewest members of a clique.
 const LEAST_MEMBERS: usize = 3;
@@ -27,7 +27,7 @@ impl ConsistencyGraph {
         let mut rows = vec![0; count * words];
         let blocks = blocks(correspondences);
         rows.par_chunks_mut(words).with_min_len(64).enumerate().for_each(|(i, row)| {
-            let own = columns(correspondences, i);
+            let own = correspondences.rows[i];
             pulp::Arch::new().dispatch(|| {
                 for (bits, block) in row.iter_mut().zip(&blocks) {
                     *bits = agreeing(&own, block, tolerance);
@@ -103,26 +103,21 @@ type Block = [[f32; 64]; 12];
 fn blocks(correspondences: &Correspondences) -> Vec<Block> {
     // What pads the last block agrees with nothing.
     let mut blocks = vec![[[f32::NAN; 64]; 12]; correspondences.len().div_ceil(64)];
-    for i in 0..correspondences.len() {
-        for (column, value) in columns(correspondences, i).into_iter().enumerate() {
-            blocks[i / 64][column][i % 64] = value;
+    for (i, row) in correspondences.rows.iter().enumerate() {
+        for (column, value) in row.as_flattened().as_flattened().iter().enumerate() {
+            blocks[i / 64][column][i % 64] = *value;
         }
     }
     blocks
 }
 
-fn columns(correspondences: &Correspondences, i: usize) -> [f32; 12] {
-    let (s, t) = (&correspondences.source, &correspondences.target);
-    let groups = [s.points[i], s.normals[i], t.points[i], t.normals[i]];
-    std::array::from_fn(|k| groups[k / 3][k % 3])
-}
-
 /// The bits of one correspondence against 64 others.
 #[inline(always)]
-fn agreeing(own: &[f32; 12], block: &Block, tolerance: f32) -> u64 {
+fn agreeing(own: &[Place; 2], block: &Block, tolerance: f32) -> u64 {
     let mut flags = [0_u32; 64];
     for lane in 0..64 {
-        let other: [f32; 12] = std::array::from_fn(|k| block[k][lane]);
+        let vector = |first: usize| [0, 1, 2].map(|k| block[first + k][lane]);
+        let other = [[vector(0), vector(3)], [vector(6), vector(9)]];
         flags[lane] = u32::from(agree(own, &other, tolerance));
     }
     flags.iter().enumerate().fold(0, |bits, (lane, flag)| bits | u64::from(*flag) << lane)

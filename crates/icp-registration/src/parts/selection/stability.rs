@@ -25,9 +25,7 @@ pub(super) fn stability(scene: &Scene<'_>, wanted: usize) -> Result<Vec<usize>> 
 /// How much each point holds each eigen-motion of all points together: squares of `J · v`.
 fn holds(points: &[(usize, Vector3<f64>, Vector3<f64>)]) -> Result<Vec<[f64; 6]>> {
     let n = points.len() as f64;
-    let centre = points.iter().fold(Vector3::zeros(), |sum, (_, p, _)| sum + p / n);
-    let radius = (points.iter().map(|(_, p, _)| (p - centre).norm_squared() / n).sum::<f64>()).sqrt();
-    let frame = Centred { centre, radius_m: radius.max(f64::MIN_POSITIVE.sqrt()) };
+    let frame = Centred::about(points.iter().map(|(_, p, _)| *p), f64::MIN_POSITIVE.sqrt());
     let mut information = Matrix6::zeros();
     for (_, p, normal) in points {
         let j = frame.derivative(p, normal);

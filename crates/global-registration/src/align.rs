@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Matrix6};
 use rayon::prelude::*;
 use statistics::Distribution;
 
-use super::description::feature_cloud::{FeatureCloud, FeatureSet};
-use super::hypotheses::correspondences::{Correspondences, Place};
+use super::description::feature_cloud::{FeatureCloud, FeatureSet, Place};
+use super::hypotheses::correspondences::Correspondences;
 use super::hypotheses::graph::ConsistencyGraph;
 use super::hypotheses::matching::matches;
 use super::options::{CoarseOptions, SharedError};

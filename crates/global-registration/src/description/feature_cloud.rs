@@ -15,13 +15,15 @@ use crate::description::surface::Normals;
 use crate::description::surroundings::Surroundings;
 use crate::description::view::View;
 use crate::error::Result;
-use crate::hypotheses::correspondences::Place;
 use point_cloud::Cloud;
 
 /// Fewest averaged points.
 pub(crate) const LEAST_POINTS: usize = 10;
 /// Points that a pose is judged by.
 const SAMPLES: usize = 1500;
+
+/// A point about a cloud's middle and the unit normal of the surface there; a normal of NaN is unknown.
+pub(crate) type Place = [[f32; 3]; 2];
 
 /// Places about a cloud's middle with descriptors of one kind.
 #[derive(Debug, Clone)]

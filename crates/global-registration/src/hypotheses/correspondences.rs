@@ -5,15 +5,14 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::description::feature_cloud::Place;
 use crate::description::fpfh::{dot, subtract};
+use point_cloud::SAME_SURFACE_COSINE;
 use rigid_pose::absolute_orientation;
 
 /// Largest difference of the cosines between normals, and of normals with the line between the points, at which two
 /// correspondences agree.
 const COSINE_TOLERANCE: f32 = 0.25;
-
-/// A point and the unit normal of the surface there; a normal of NaN is unknown.
-pub(crate) type Place = [[f32; 3]; 2];
 
 /// Correspondences: a place of the source belongs to one of the target, perhaps.
 #[derive(Debug, Clone)]
@@ -62,7 +61,7 @@ impl Correspondences {
                 let [[p, n], [q, m]] = self.rows[i];
                 let difference = subtract(motion.point(p), q);
                 let turned = dot(motion.vector(n), m);
-                dot(difference, difference) <= limit && (turned >= 0.7 || turned.is_nan())
+                dot(difference, difference) <= limit && (turned >= SAME_SURFACE_COSINE as f32 || turned.is_nan())
             })
             .map(|i| i as u32)
             .collect()

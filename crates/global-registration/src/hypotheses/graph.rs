@@ -9,7 +9,8 @@
 
 use rayon::prelude::*;
 
-use crate::hypotheses::correspondences::{Correspondences, Place, agree};
+use crate::description::feature_cloud::Place;
+use crate::hypotheses::correspondences::{Correspondences, agree};
 
 /// Fewest members of a clique.
 const LEAST_MEMBERS: usize = 3;

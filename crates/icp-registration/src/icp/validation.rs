@@ -22,7 +22,7 @@ impl Registration<'_> {
         }
         let elsewhere = self.alternatives.iter().flat_map(|alternative| &alternative.rejection);
         for rejection in self.rejection.iter().chain(elsewhere) {
-            rejection.validate(scene)?;
+            rejection.validate()?;
         }
         if self.degeneracy == DegeneracyPolicy::HoldAtPrior {
             prior::validate(self.prior_covariance.as_ref())?;

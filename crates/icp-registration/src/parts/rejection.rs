@@ -16,8 +16,8 @@ pub trait PairRejection: Sync {
     /// Takes out of all pairs (those that every part keeps) the ones that do not fit among them.
     fn reject(&self, _scene: &Scene<'_>, _pairs: &mut Vec<Pair>) {}
 
-    /// Refuses parameters outside their domain, and attributes that are needed and missing.
-    fn validate(&self, _scene: &Scene<'_>) -> Result<()> {
+    /// Refuses parameters outside their domain.
+    fn validate(&self) -> Result<()> {
         Ok(())
     }
 }
@@ -33,7 +33,7 @@ impl PairRejection for MaxNormalAngle {
         cosine.is_nan() || cosine >= self.0.cos()
     }
 
-    fn validate(&self, _: &Scene<'_>) -> Result<()> {
+    fn validate(&self) -> Result<()> {
         Ok(require_positive("max_normal_angle_rad", self.0)?)
     }
 }
@@ -51,7 +51,7 @@ impl PairRejection for Trimmed {
         }
     }
 
-    fn validate(&self, _: &Scene<'_>) -> Result<()> {
+    fn validate(&self) -> Result<()> {
         Ok(require_option("trim", self.0, "above 0 and at most 1", |share| share > 0.0 && share <= 1.0)?)
     }
 }

@@ -13,6 +13,6 @@ mod motion;
 mod verdict;
 
 pub(crate) use cells::Cells;
-pub use directions::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
+pub use directions::{Direction, Directions, FEWEST_CELLS, OPEN, SIGNIFICANCE, expanded};
 pub use motion::{MotionKind, UndeterminedMotion};
 pub(crate) use verdict::{Free, ROUNDING, Verdict};

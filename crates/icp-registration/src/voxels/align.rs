@@ -1,14 +1,15 @@
 //! The registration of two clouds of voxels.
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Isometry3;
 
 use super::cloud::VoxelCloud;
+use super::level::Level;
 use super::options::VoxelAlignmentOptions;
 use super::pairs::{Matcher, Pair, Partners, System, matched};
 use super::wide::{RULES, Wide};
 use crate::error::Result;
 use crate::kernel::RobustKernel;
-use crate::quality::{Cells, Free, Verdict};
+use crate::quality::{Cells, Free, OPEN, Verdict};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
 use rigid_pose::{InputError, motion_length, require_pose};
 
@@ -16,8 +17,6 @@ use rigid_pose::{InputError, motion_length, require_pose};
 /// case: a coarse level ends then, in the finest one they are kept.
 const SETTLED_STEP: f64 = 0.02;
 const MOST_SEARCHES: usize = 15;
-/// Planes of a level below which it is passed over.
-const FEWEST_PLANES: usize = 100;
 /// Least size of those cells: planes of voxels nearer than three share points.
 const VOXELS_PER_CELL: f64 = 6.0;
 
@@ -60,8 +59,10 @@ impl<'a> Run<'a> {
     fn finish(mut self, guess: &Isometry3<f64>) -> Result<IcpResult> {
         let mut matchers = self.matchers();
         self.approach(&mut matchers)?;
+        let least_squares = self.options.kernel == RobustKernel::None;
+        let coarse = if least_squares { RobustKernel::None } else { RobustKernel::Cauchy };
         for matcher in &matchers[..matchers.len() - 1] {
-            self.level(*matcher)?;
+            self.search(*matcher, coarse)?;
         }
         let last = matchers[matchers.len() - 1];
         let mut stop = self.settle(last)?;
@@ -77,22 +78,13 @@ impl<'a> Run<'a> {
     /// Levels of the source from coarse to fine, each with the target's level of the most similar size.
     fn matchers(&self) -> Vec<Matcher<'a>> {
         let (target, source) = (self.target, self.source);
-        let planes = |m: &Matcher<'_>| m.source.voxels.iter().filter(|v| v.variance < f64::INFINITY).count();
-        let mut matchers: Vec<Matcher<'a>> = source
-            .levels
-            .iter()
-            .map(|level| {
-                let unlike = |other: f64| (other / level.size_m).ln().abs();
-                let nearest = target.levels.iter().min_by(|a, b| unlike(a.size_m).total_cmp(&unlike(b.size_m)));
-                let nearest = nearest.unwrap_or(&target.levels[0]);
-                Matcher { source: level, target: nearest, target_lattice: &target.lattice }
-            })
-            .collect();
-        while matchers.len() > 1 && matchers.last().is_some_and(|m| planes(m) < FEWEST_PLANES) {
-            matchers.pop();
-        }
-        matchers.reverse();
-        matchers
+        let matcher = |level: &'a Level| {
+            let unlike = |other: f64| (other / level.size_m).ln().abs();
+            let nearest = target.levels.iter().min_by(|a, b| unlike(a.size_m).total_cmp(&unlike(b.size_m)));
+            let nearest = nearest.unwrap_or(&target.levels[0]);
+            Matcher { source: level, target: nearest, target_lattice: &target.lattice }
+        };
+        source.levels.iter().rev().map(matcher).collect()
     }
 
     /// Brings the pose to where the first of the levels that are left can find partners.
@@ -133,37 +125,33 @@ impl<'a> Run<'a> {
         System::new(&self.pairs, kernel, &mut self.scratch)
     }
 
-    /// Iterates on a coarse level.
-    fn level(&mut self, matcher: Matcher<'_>) -> Result<()> {
+    /// Iterates while partners change; the length of the last step, metre.
+    fn search(&mut self, matcher: Matcher<'_>, kernel: RobustKernel) -> Result<f64> {
+        let mut step_m = f64::INFINITY;
         for _ in 0..MOST_SEARCHES {
-            let kernel =
-                if self.options.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Cauchy };
-            let step = self.step(matcher, Partners::Anew, kernel)?;
-            if motion_length(&step) < SETTLED_STEP * matcher.target.size_m {
+            step_m = self.step(matcher, Partners::Anew, kernel)?;
+            if step_m < SETTLED_STEP * matcher.target.size_m {
                 break;
             }
         }
-        Ok(())
+        Ok(step_m)
     }
 
     /// Iterates on the finest level.
     fn settle(&mut self, matcher: Matcher<'_>) -> Result<StopReason> {
-        let tolerance = self.options.step_tolerance_m.unwrap_or(1e-5 * self.target.radius_m);
-        let (mut partners, mut searches) = (Partners::Anew, 0);
-        while searches == 0 || self.iterations < self.options.max_iterations {
-            let step = motion_length(&self.step(matcher, partners, self.options.kernel)?);
-            if step <= tolerance {
-                return Ok(StopReason::Converged);
+        let tolerance_m = self.options.step_tolerance_m.unwrap_or(1e-5 * self.target.radius_m);
+        let mut step_m = self.search(matcher, self.options.kernel)?;
+        while step_m > tolerance_m {
+            if self.iterations >= self.options.max_iterations {
+                return Ok(StopReason::MaxIterations);
             }
-            searches += 1;
-            if step < SETTLED_STEP * matcher.target.size_m || searches >= MOST_SEARCHES {
-                partners = Partners::Kept;
-            }
+            step_m = self.step(matcher, Partners::Kept, self.options.kernel)?;
         }
-        Ok(StopReason::MaxIterations)
+        Ok(StopReason::Converged)
     }
 
-    fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<Vector6<f64>> {
+    /// One step; its length, metre.
+    fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<f64> {
         let (pose, free) = (self.pose, self.free);
         let mut system = self.enough(matcher, partners, kernel)?;
         system.frame = free.frame.unwrap_or(system.frame);
@@ -173,7 +161,7 @@ impl<'a> Run<'a> {
         step /= (motion_length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
         self.pose = frame.moved(&pose, &step);
         self.iterations += 1;
-        Ok(step)
+        Ok(motion_length(&step))
     }
 
     fn enough(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<System<'_>> {
@@ -188,7 +176,7 @@ impl<'a> Run<'a> {
 
     /// What the pairs of the pose say about it.
     fn verdict(&mut self, matcher: Matcher<'_>) -> Result<Verdict> {
-        let max_sigma_m = self.options.max_motion_sigma_m.unwrap_or(self.target.radius_m / 300.0);
+        let max_sigma_m = self.options.max_motion_sigma_m.unwrap_or(OPEN * self.target.radius_m);
         let system = self.enough(matcher, Partners::Anew, self.options.kernel)?;
         let cell_m = (system.frame.radius_m / Cells::PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m);
         Verdict::new(&system.cells(matcher.target, cell_m), max_sigma_m)

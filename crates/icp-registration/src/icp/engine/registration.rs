@@ -13,7 +13,7 @@ use crate::kernel::RobustKernel;
 use crate::parts::{
     ErrorMetric, Minimiser, Moment, NearestPoint, PairRejection, PairWeighting, PointMatching, PointSelection, Scene,
 };
-use crate::quality::{Free, Verdict};
+use crate::quality::{Free, OPEN, Verdict};
 use crate::result::DegeneracyPolicy;
 use crate::result::{IcpResult, StopReason};
 use crate::system::System;
@@ -206,6 +206,6 @@ impl<'p> Engine<'p> {
     }
 
     pub(crate) fn max_motion_sigma_m(&self) -> f64 {
-        self.parts.max_motion_sigma_m.unwrap_or(self.scene.target.radius_m / 300.0)
+        self.parts.max_motion_sigma_m.unwrap_or(OPEN * self.scene.target.radius_m)
     }
 }

@@ -105,12 +105,12 @@ impl Motion {
 
     #[inline(always)]
     pub(crate) fn vector(&self, v: [f32; 3]) -> [f32; 3] {
-        self.rows.map(|row| dot(row, v))
+        [dot(self.rows[0], v), dot(self.rows[1], v), dot(self.rows[2], v)]
     }
 
     #[inline(always)]
     pub(crate) fn point(&self, p: [f32; 3]) -> [f32; 3] {
-        let turned = self.vector(p);
-        std::array::from_fn(|k| turned[k] + self.shift[k])
+        let [x, y, z] = self.vector(p);
+        [x + self.shift[0], y + self.shift[1], z + self.shift[2]]
     }
 }

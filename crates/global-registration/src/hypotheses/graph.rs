@@ -5,7 +5,8 @@
 //! largest is often that of a wall slid along itself. Seeds and growth are ranked by the number of
 //! common neighbours of two correspondences.
 // Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Lanes lie side by side.
+#![allow(clippy::inline_always, clippy::needless_range_loop)]
 
 use rayon::prelude::*;
 
@@ -28,12 +29,7 @@ impl ConsistencyGraph {
         let mut rows = vec![0; count * words];
         let blocks = blocks(correspondences);
         rows.par_chunks_mut(words).with_min_len(64).enumerate().for_each(|(i, row)| {
-            let own = correspondences.rows[i];
-            pulp::Arch::new().dispatch(|| {
-                for (bits, block) in row.iter_mut().zip(&blocks) {
-                    *bits = agreeing(&own, block, tolerance);
-                }
-            });
+            pulp::Arch::new().dispatch(Row { own: &correspondences.rows[i], blocks: &blocks, tolerance, row });
         });
         Self { words, rows }
     }
@@ -112,16 +108,29 @@ fn blocks(correspondences: &Correspondences) -> Vec<Block> {
     blocks
 }
 
-/// The bits of one correspondence against 64 others.
-#[inline(always)]
-fn agreeing(own: &[Place; 2], block: &Block, tolerance: f32) -> u64 {
-    let mut flags = [0_u32; 64];
-    for lane in 0..64 {
-        let vector = |first: usize| [0, 1, 2].map(|k| block[first + k][lane]);
-        let other = [[vector(0), vector(3)], [vector(6), vector(9)]];
-        flags[lane] = u32::from(agree(own, &other, tolerance));
+/// The bits of one correspondence against all others, 64 at a time. A closure would not be compiled for wide registers.
+struct Row<'a> {
+    own: &'a [Place; 2],
+    blocks: &'a [Block],
+    tolerance: f32,
+    row: &'a mut [u64],
+}
+
+impl pulp::NullaryFnOnce for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (bits, block) in self.row.iter_mut().zip(self.blocks) {
+            let mut flags = [0_u32; 64];
+            for lane in 0..64 {
+                let vector = |k: usize| [block[k][lane], block[k + 1][lane], block[k + 2][lane]];
+                let other = [[vector(0), vector(3)], [vector(6), vector(9)]];
+                flags[lane] = u32::from(agree(self.own, &other, self.tolerance));
+            }
+            *bits = flags.iter().enumerate().fold(0, |bits, (lane, flag)| bits | u64::from(*flag) << lane);
+        }
     }
-    flags.iter().enumerate().fold(0, |bits, (lane, flag)| bits | u64::from(*flag) << lane)
 }
 
 fn members(row: &[u64]) -> impl Iterator<Item = usize> + '_ {

@@ -82,18 +82,6 @@ impl Verdict {
         let to_tangent = self.frame.tangent_from_motion(pose);
         symmetrised(&(to_tangent * centred * to_tangent.transpose()))
     }
-
-    /// Inverse of the covariance along the determined motions, zero along the others; in the tangent of
-    /// [`Verdict::covariance`].
-    pub fn information(&self, pose: &Isometry3<f64>, response: &Matrix6<f64>) -> Matrix6<f64> {
-        let known: Vec<&Direction> = self.directions.all().iter().filter(|d| d.determined).collect();
-        let (basis, inside) = self.directions.sandwich(&known, |basis| inverse_response(&known, basis, response));
-        let inverse = inside.try_inverse().unwrap_or_else(|| DMatrix::zeros(known.len(), known.len()));
-        let centred = expanded(&basis, &inverse);
-        let to_tangent = self.frame.tangent_from_motion(pose);
-        let from_tangent = to_tangent.try_inverse().unwrap_or_else(Matrix6::zeros);
-        symmetrised(&(from_tangent.transpose() * centred * from_tangent))
-    }
 }
 
 /// Inverse of the response among the known directions; none where the differences drown in noise.

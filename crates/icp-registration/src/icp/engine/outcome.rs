@@ -11,6 +11,7 @@ use crate::icp::prior::fused_with_prior;
 use crate::parts::{Moment, Scene, thinned};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::system::System;
+use rigid_pose::Uncertain;
 
 /// Source points from which the response of the score and the overlap are taken.
 const RESPONSE_POINTS: usize = 4000;
@@ -52,8 +53,8 @@ impl Engine<'_> {
             degenerate: verdict.undetermined(),
         };
         if let (DegeneracyPolicy::HoldAtPrior, Some(prior)) = (self.parts.degeneracy, &self.parts.prior_covariance) {
-            let information = verdict.information(&track.pose, &response);
-            (result.target_from_source, result.covariance) = fused_with_prior(&track.pose, &information, guess, prior)?;
+            let fused = fused_with_prior(&Uncertain { pose: track.pose, covariance: result.covariance }, guess, prior)?;
+            (result.target_from_source, result.covariance) = (fused.pose, fused.covariance);
         }
         Ok(result)
     }

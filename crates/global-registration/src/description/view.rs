@@ -16,9 +16,8 @@ pub(crate) enum Sight {
     InFree,
     /// Where something was seen.
     OnSurface,
-    /// Behind what was seen.
-    Hidden,
-    /// In a direction that nothing is known of, or at a jump of the range where the point may be hidden or not.
+    /// Behind what was seen, in a direction that nothing is known of, or at a jump of the range where the point may be hidden
+    /// or not.
     Unknown,
 }
 
@@ -68,13 +67,12 @@ impl View {
 
     pub(crate) fn sight(&self, point: [f32; 3], jumps: Jumps) -> Sight {
         let Some((cell, range)) = self.cell(point) else { return Sight::Unknown };
-        if self.farthest[cell] <= 0.0 {
+        let (nearest, farthest) = (self.nearest[cell], self.farthest[cell]);
+        if farthest <= 0.0 || range > farthest + self.tolerance {
             Sight::Unknown
-        } else if range < self.nearest[cell] - self.tolerance {
+        } else if range < nearest - self.tolerance {
             Sight::InFree
-        } else if range > self.farthest[cell] + self.tolerance {
-            Sight::Hidden
-        } else if jumps == Jumps::Unknown && self.farthest[cell] > self.nearest[cell] + JUMP * self.tolerance {
+        } else if jumps == Jumps::Unknown && farthest > nearest + JUMP * self.tolerance {
             Sight::Unknown
         } else {
             Sight::OnSurface

@@ -29,7 +29,7 @@ impl ConsistencyGraph {
         let mut rows = vec![0; count * words];
         let blocks = blocks(correspondences);
         rows.par_chunks_mut(words).with_min_len(64).enumerate().for_each(|(i, row)| {
-            pulp::Arch::new().dispatch(Row { own: &correspondences.rows[i], blocks: &blocks, tolerance, row });
+            pulp::Arch::new().dispatch(Row { own: &correspondences.rows[i], blocks: &blocks, tolerance, bits: row });
         });
         Self { words, rows }
     }
@@ -113,7 +113,7 @@ struct Row<'a> {
     own: &'a [Place; 2],
     blocks: &'a [Block],
     tolerance: f32,
-    row: &'a mut [u64],
+    bits: &'a mut [u64],
 }
 
 impl pulp::NullaryFnOnce for Row<'_> {
@@ -121,7 +121,7 @@ impl pulp::NullaryFnOnce for Row<'_> {
 
     #[inline(always)]
     fn call(self) {
-        for (bits, block) in self.row.iter_mut().zip(self.blocks) {
+        for (bits, block) in self.bits.iter_mut().zip(self.blocks) {
             let mut flags = [0_u32; 64];
             for lane in 0..64 {
                 let vector = |k: usize| [block[k][lane], block[k + 1][lane], block[k + 2][lane]];

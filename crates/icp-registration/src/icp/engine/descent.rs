@@ -29,7 +29,7 @@ pub struct Levels {
     /// Largest distance of a pair at the end, metre. `None`: three times the spacing of the target; where that is zero,
     /// a fiftieth of its radius for a surface without gaps.
     pub last_limit_m: Option<f64>,
-    /// Source points that the levels before the last work with. Default 4000.
+    /// Source points that the levels before the last work with, and that tell how the score responds to the pose. Default 4000.
     pub points: usize,
     /// Iterations that a level before the last may take. Default 12.
     pub iterations: usize,

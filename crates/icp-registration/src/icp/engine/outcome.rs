@@ -13,8 +13,7 @@ use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::system::System;
 use rigid_pose::Uncertain;
 
-/// Source points from which the response of the score and the overlap are taken.
-const RESPONSE_POINTS: usize = 4000;
+/// Source points from which the overlap is taken where not all are selected.
 const OVERLAP_POINTS: usize = 20_000;
 
 impl Engine<'_> {
@@ -38,7 +37,7 @@ impl Engine<'_> {
         let pairs = self.enough(&scene, gated, points, track.iterations)?;
         let system = System::new(&scene, self.metric, &pairs, self.kernel);
         let verdict = verdict(&system, self.max_motion_sigma_m())?;
-        let sample = thinned(&points.indices, RESPONSE_POINTS);
+        let sample = thinned(&points.indices, self.parts.levels.points);
         let step_m = (0.5 * system.rms_m()).max(0.01 * limit_m);
         let response = sensitivity(self, &system, &sample, step_m)?;
         let mut result = IcpResult {

@@ -6,11 +6,10 @@ use nalgebra::{Isometry3, Matrix6};
 use rayon::prelude::*;
 use statistics::Distribution;
 
-use super::description::feature_cloud::FeatureCloud;
-use super::description::features::Features;
+use super::description::feature_cloud::{FeatureCloud, FeatureSet, Place};
 use super::hypotheses::correspondences::Correspondences;
 use super::hypotheses::graph::ConsistencyGraph;
-use super::hypotheses::matching::{Match, matches};
+use super::hypotheses::matching::matches;
 use super::options::{CoarseOptions, SharedError};
 use super::verification::distinct::Common;
 use super::verification::judge::Verdict;
@@ -106,14 +105,14 @@ fn looked_for(
     let common = Common::new(source, target, &winner.pose, options);
     let settled = common.settled(source, target, &winner.pose);
     let (pose, verdict) = (settled.pose, settled.verdict);
-    let partners = (winner.verdict.hits() + rival.map_or(0, |rival| rival.verdict.hits())) as f64;
+    let partners = (winner.verdict.hits + rival.map_or(0, |rival| rival.verdict.hits)) as f64;
     let alignment = CoarseAlignment {
         target_from_source: target.between_frames(source, &pose),
         covariance: settled.covariance,
         shared_error: common.errors.map_or_else(SharedError::default, |errors| errors.shared),
         inliers: correspondences.inliers(&pose, tolerance).len(),
         correspondences: correspondences.len(),
-        overlap: verdict.overlap(),
+        overlap: verdict.overlap,
         agreement: verdict.agreement(),
         consistency: verdict.consistency(&common.misses),
         inside: common.inside,
@@ -165,7 +164,7 @@ fn verified(
     let verify = |(pose, _): &(Isometry3<f64>, f64)| {
         let refined = refine(source, target, pose);
         let verdict = Verdict::new(source, target, &refined.pose, 1);
-        let added = verdict.points() as f64 * correspondences.added_share(&refined.pose, tolerance);
+        let added = verdict.points as f64 * correspondences.added_share(&refined.pose, tolerance);
         Hypothesis { pose: refined.pose, verdict, evidence: verdict.evidence() + added, rms_m: refined.rms_m }
     };
     ranked.par_iter().map(verify).collect()
@@ -197,39 +196,18 @@ fn with_common_voxels<'a>(
 
 /// Matches of all kinds of descriptors, the most alike first of each kind.
 fn correspondences(source: &FeatureCloud, target: &FeatureCloud) -> Correspondences {
-    let mut all = Correspondences::default();
     let kinds = source.surface_features.len() + source.added.len();
     let share = MOST_CORRESPONDENCES / kinds.max(1);
-    for (s, t) in source.surface_features.iter().zip(&target.surface_features) {
+    let of = |(s, t): (&FeatureSet, &FeatureSet)| {
         let mut found = matches(&s.descriptors, &t.descriptors);
-        most_alike(&mut found, share);
-        for m in found {
-            let (i, j) = (m.source as usize, m.target as usize);
-            all.push((s.points[i], s.normals[i]), (t.points[j], t.normals[j]));
-        }
-    }
-    all.of_surface = all.len();
-    for (s, t) in source.added.iter().zip(&target.added) {
-        let mut found = matches(&s.table, &t.table);
-        most_alike(&mut found, share);
-        for m in found {
-            all.push(placed(source, s, m.source), placed(target, t, m.target));
-        }
-    }
-    all
-}
-
-fn most_alike(matches: &mut Vec<Match>, count: usize) {
-    matches.sort_by(|a, b| b.likeness.total_cmp(&a.likeness));
-    matches.truncate(count);
-}
-
-/// An added feature about the cloud's middle with the normal of the surface there.
-fn placed(cloud: &FeatureCloud, features: &Features, index: u32) -> ([f32; 3], [f32; 3]) {
-    let relative = features.points[index as usize].coords - cloud.reduced.middle;
-    let point = [relative.x as f32, relative.y as f32, relative.z as f32];
-    let normal = cloud.labels[0].near(point).map_or([f32::NAN; 3], |near| cloud.normals.vectors[near]);
-    (point, if cloud.normals.sided { normal } else { [f32::NAN; 3] })
+        found.sort_by(|a, b| b.likeness.total_cmp(&a.likeness));
+        found.truncate(share);
+        found.into_iter().map(|m| [s.places[m.source as usize], t.places[m.target as usize]]).collect::<Vec<_>>()
+    };
+    let mut rows: Vec<[Place; 2]> = source.surface_features.iter().zip(&target.surface_features).flat_map(of).collect();
+    let of_surface = rows.len();
+    rows.extend(source.added.iter().zip(&target.added).flat_map(of));
+    Correspondences { rows, of_surface }
 }
 
 /// Poses of sets of correspondences that agree, each fitted again to all that agree with it.

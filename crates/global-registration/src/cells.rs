@@ -9,17 +9,17 @@ const MASK: u64 = (1 << BITS) - 1;
 /// The three indices of a cell in one number; `None` beyond a million cells from the origin (or for NaN).
 #[inline]
 pub(super) fn key_of(point: [f32; 3], per_cell: f32) -> Option<u64> {
-    let scaled = point.map(|c| c * per_cell);
+    let [x, y, z] = [point[0] * per_cell, point[1] * per_cell, point[2] * per_cell];
     // NaN fails the comparison.
-    if !scaled.iter().all(|c| c.abs() <= HALF_RANGE) {
+    if !(x.abs() <= HALF_RANGE && y.abs() <= HALF_RANGE && z.abs() <= HALF_RANGE) {
         return None;
     }
     // Rounding down without a call of the library, which machines without that instruction need.
-    let [x, y, z] = scaled.map(|c| {
+    let index = |c: f32| {
         let cut = c as i32;
         (cut - i32::from(cut as f32 > c) + (1 << 20)) as u64
-    });
-    Some(x | y << BITS | z << (2 * BITS))
+    };
+    Some(index(x) | index(y) << BITS | index(z) << (2 * BITS))
 }
 
 /// The cell that lies `step` cells away; keys from [`key_of`] leave a margin of one cell at either end.
@@ -31,7 +31,8 @@ pub(super) fn shifted(key: u64, step: [i64; 3]) -> u64 {
 
 /// Middle of a cell in units of cells.
 pub(super) fn middle(key: u64) -> [f32; 3] {
-    [0, BITS, 2 * BITS].map(|shift| (((key >> shift) & MASK) as i32 - (1 << 20)) as f32 + 0.5)
+    let index = |shift: u32| (((key >> shift) & MASK) as i32 - (1 << 20)) as f32 + 0.5;
+    [index(0), index(BITS), index(2 * BITS)]
 }
 
 /// Open addressing with linear probing; values are given by the caller.

@@ -11,9 +11,10 @@ mod target;
 mod voxels;
 
 pub use error::Error;
-pub use icp::{Alternative, IcpOptions, Levels, Metric, Registration, Selection, Starts, align};
+pub use icp::{Alternative, IcpOptions, Levels, Metric, Registration, Settled, Starts, align};
 pub use kernel::{RobustKernel, TUKEY};
 pub use nalgebra;
+pub use parts::Selection;
 pub use point_cloud::{self, Cloud};
 pub use quality::{MotionKind, UndeterminedMotion};
 pub use result::{DegeneracyPolicy, IcpResult, StopReason};

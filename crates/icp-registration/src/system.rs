@@ -22,7 +22,7 @@ pub struct System<'a> {
     pairs: &'a [Pair],
     kernel: RobustKernel,
     frame: Centred,
-    /// Standard deviation of a whitened residual, times the widening of the kernel.
+    /// Standard deviation of a whitened residual.
     scale: f64,
     /// Factor that brings residuals of channel 1 to metres.
     balance: f64,
@@ -35,7 +35,7 @@ impl<'a> System<'a> {
         scene: &'a Scene<'a>,
         metric: &'a dyn ErrorMetric,
         pairs: &'a [Pair],
-        (kernel, widening): (RobustKernel, f64),
+        kernel: RobustKernel,
     ) -> Self {
         // Pairs all in one place leave the rotation undetermined whatever the radius.
         let frame = Centred::about(pairs.iter().map(|pair| pair.moved), f64::MIN_POSITIVE.sqrt());
@@ -45,8 +45,13 @@ impl<'a> System<'a> {
         let mut whitened: Vec<f64> = pairs.iter().zip(&system.lengths).map(|(p, l)| l * p.weight.sqrt()).collect();
         // Without pairs there is no scale.
         let median = upper_median(&mut whitened).max(0.0);
-        system.scale = widening * median / CHI_MEDIANS[metric.degrees_of_freedom().clamp(1, 4) - 1];
+        system.scale = median / CHI_MEDIANS[metric.degrees_of_freedom().clamp(1, 4) - 1];
         system
+    }
+
+    /// With motions told in another frame.
+    pub(crate) fn in_frame(self, frame: Option<Centred>) -> Self {
+        Self { frame: frame.unwrap_or(self.frame), ..self }
     }
 
     /// The same frame, scale and kernel with other pairs: what the score would be had the pose been a little different.
@@ -88,13 +93,24 @@ impl<'a> System<'a> {
 
     /// Normal equations, summed in fixed chunks.
     pub fn normal_equations(&self) -> MotionEquations {
-        self.summed(|i| (self.pairs[i], self.weights(i).0))
-    }
-
-    /// As [`System::normal_equations`] for the same pairs after a motion, with given weights.
-    pub fn normal_equations_after(&self, motion: &Vector6<f64>, weights: &[f64]) -> MotionEquations {
-        let turn = UnitQuaternion::from_scaled_axis(motion.fixed_rows::<3>(3) / self.frame.radius_m);
-        self.summed(|i| (self.after(&self.pairs[i], motion, &turn), weights[i]))
+        let starts: Vec<usize> = (0..self.pairs.len()).step_by(CHUNK).collect();
+        let chunk = |&start: &usize| {
+            let mut equations = MotionEquations::default();
+            let mut rows = Rows::default();
+            for i in start..(start + CHUNK).min(self.pairs.len()) {
+                let (pair, weight) = (&self.pairs[i], self.weights(i).0);
+                self.rows(pair, &mut rows);
+                for (row, residual) in rows.as_slice().iter().zip(self.residuals(&rows)) {
+                    equations.add(&self.jacobian(pair, row), weight, residual);
+                }
+            }
+            equations
+        };
+        let partial: Vec<MotionEquations> = starts.par_iter().map(chunk).collect();
+        partial.into_iter().fold(MotionEquations::default(), |mut sum, equations| {
+            sum += equations;
+            sum
+        })
     }
 
     /// Weighted sum of squares of the same pairs after a motion.
@@ -102,7 +118,9 @@ impl<'a> System<'a> {
         let turn = UnitQuaternion::from_scaled_axis(motion.fixed_rows::<3>(3) / self.frame.radius_m);
         let mut rows = Rows::default();
         let squares = self.pairs.iter().zip(weights).map(|(pair, weight)| {
-            self.rows(&self.after(pair, motion, &turn), &mut rows);
+            let moved = self.frame.centre + turn * (pair.moved - self.frame.centre) + motion.fixed_rows::<3>(0);
+            let distance_m = (moved - pair.point).norm();
+            self.rows(&Pair { moved, source_normal: turn * pair.source_normal, distance_m, ..*pair }, &mut rows);
             weight * self.residuals(&rows).map(|r| r * r).sum::<f64>()
         });
         squares.sum()
@@ -199,33 +217,5 @@ impl<'a> System<'a> {
         let [length, other] = channels.map(|mut residuals| mad_scale(&mut residuals).max(0.0));
         // Exact lengths must not silence the other channel.
         if other > 0.0 { length.max(SMALLEST_LENGTH * self.frame.radius_m) / other } else { 0.0 }
-    }
-
-    /// A pair after a motion about the centre, partner unchanged.
-    fn after(&self, pair: &Pair, motion: &Vector6<f64>, turn: &UnitQuaternion<f64>) -> Pair {
-        let moved = self.frame.centre + turn * (pair.moved - self.frame.centre) + motion.fixed_rows::<3>(0);
-        let distance_m = (moved - pair.point).norm();
-        Pair { moved, source_normal: turn * pair.source_normal, distance_m, ..*pair }
-    }
-
-    fn summed(&self, pair: impl Fn(usize) -> (Pair, f64) + Sync) -> MotionEquations {
-        let starts: Vec<usize> = (0..self.pairs.len()).step_by(CHUNK).collect();
-        let chunk = |&start: &usize| {
-            let mut equations = MotionEquations::default();
-            let mut rows = Rows::default();
-            for i in start..(start + CHUNK).min(self.pairs.len()) {
-                let (pair, weight) = pair(i);
-                self.rows(&pair, &mut rows);
-                for (row, residual) in rows.as_slice().iter().zip(self.residuals(&rows)) {
-                    equations.add(&self.jacobian(&pair, row), weight, residual);
-                }
-            }
-            equations
-        };
-        let partial: Vec<MotionEquations> = starts.par_iter().map(chunk).collect();
-        partial.into_iter().fold(MotionEquations::default(), |mut sum, equations| {
-            sum += equations;
-            sum
-        })
     }
 }

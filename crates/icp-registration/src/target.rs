@@ -10,6 +10,7 @@ use crate::result::IcpResult;
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
 use point_cloud::{UnorganisedNormalOptions, normals_with_tree};
+use rigid_pose::Centred;
 
 /// Points whose distance to their neighbour is looked at for the spacing.
 const SPACING_SAMPLES: usize = 2000;
@@ -38,7 +39,7 @@ impl IcpTarget {
             None => normals_with_tree(&cloud.points, &tree, &UnorganisedNormalOptions::default())?,
         };
         let spacing_m = spacing(&cloud, &tree)?;
-        let radius_m = radius(&cloud);
+        let radius_m = Centred::about(cloud.points.iter().map(|p| p.coords), 0.0).radius_m;
         Ok(Self { cloud, tree, normals, spacing_m, radius_m })
     }
 
@@ -82,11 +83,4 @@ fn spacing(cloud: &Cloud, tree: &NeighbourTree) -> Result<f64> {
     }
     // A single point has no spacing.
     Ok(ranked(&mut distances, 0.9).max(0.0))
-}
-
-/// Root mean square distance from the centroid.
-fn radius(cloud: &Cloud) -> f64 {
-    let n = cloud.len() as f64;
-    let centre = cloud.points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords / n);
-    (cloud.points.iter().map(|p| (p.coords - centre).norm_squared() / n).sum::<f64>()).sqrt()
 }

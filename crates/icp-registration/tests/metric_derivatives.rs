@@ -6,7 +6,7 @@ use icp_registration::parts::{
     SymmetricPlanes,
 };
 use icp_registration::{IcpTarget, Registration, System};
-use nalgebra::Vector6;
+use nalgebra::{Matrix6, Vector6};
 
 /// Compares the right-hand side with half the difference quotient of the sum of squares; the first `unknowns` of it.
 struct Checked {
@@ -14,9 +14,9 @@ struct Checked {
 }
 
 impl Minimiser for Checked {
-    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>, icp_registration::Error> {
+    fn step(&self, system: &System<'_>, free: &Matrix6<f64>) -> Result<Vector6<f64>, icp_registration::Error> {
         let weights = system.all_weights();
-        let g = system.normal_equations_after(&Vector6::zeros(), &weights).gradient;
+        let g = system.normal_equations().gradient;
         let h = 1e-6;
         // Central differences: rounding of the sum of squares over the step.
         let rounding = 1e-15 * system.squares_after(&Vector6::zeros(), &weights) / h;
@@ -27,9 +27,7 @@ impl Minimiser for Checked {
                 (system.squares_after(&motion, &weights) - system.squares_after(&-motion, &weights)) / (4.0 * h);
             assert!((quotient - g[k]).abs() < 1e-5 * g.norm() + 100.0 * rounding, "{k}: {quotient} {}", g[k]);
         }
-        // Turning by nothing about the centre still rounds.
-        assert!((system.normal_equations().gradient - g).norm() <= 1e-9 * g.norm().max(rounding));
-        GaussNewton.step(system, held)
+        GaussNewton.step(system, free)
     }
 }
 

@@ -4,15 +4,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common::{Pinhole, Scene as Room, cloud, disturbance, look_at, pose_error};
 use icp_registration::parts::{
-    ErrorMetric, KernelSchedule, Minimiser, Moment, Pair, PairRejection, PairWeighting, Partner, PointMatching,
-    PointSelection, Progress, Query, Row, Rows, Scene, StoppingRule, TargetSurface,
+    ErrorMetric, Minimiser, Pair, PairRejection, PairWeighting, Partner, PointMatching, PointSelection, Query, Row,
+    Rows, Scene, TargetSurface,
 };
-use icp_registration::{IcpTarget, Registration, RobustKernel, StopReason, System};
+use icp_registration::{IcpTarget, Registration, System};
 use nalgebra::{Matrix6, Vector6};
 
 /// Calls of each part.
 #[derive(Default)]
-struct Calls([AtomicUsize; 8]);
+struct Calls([AtomicUsize; 6]);
 
 impl Calls {
     fn count(&self, part: usize) {
@@ -102,38 +102,12 @@ impl ErrorMetric for PlaneToPoint<'_> {
 struct Cholesky<'a>(&'a Calls);
 
 impl Minimiser for Cholesky<'_> {
-    fn step(&self, system: &System<'_>, _held: &[Vector6<f64>]) -> Result<Vector6<f64>, icp_registration::Error> {
+    fn step(&self, system: &System<'_>, _free: &Matrix6<f64>) -> Result<Vector6<f64>, icp_registration::Error> {
         self.0.count(5);
         let equations = system.normal_equations();
         let matrix = equations.matrix + Matrix6::identity() * (1e-12 * equations.matrix.trace());
         let solved = matrix.cholesky().map(|factor| factor.solve(&equations.gradient));
         Ok(-solved.unwrap_or_else(Vector6::zeros))
-    }
-}
-
-/// Least squares first, Tukey's kernel in the last level.
-struct LateTukey<'a>(&'a Calls);
-
-impl KernelSchedule for LateTukey<'_> {
-    fn at(&self, moment: &Moment) -> (RobustKernel, f64) {
-        self.0.count(6);
-        let last = moment.level + 1 == moment.levels;
-        (if last { RobustKernel::Tukey } else { RobustKernel::None }, 1.0)
-    }
-}
-
-struct SmallSteps<'a>(&'a Calls);
-
-impl StoppingRule for SmallSteps<'_> {
-    fn max_iterations(&self) -> usize {
-        80
-    }
-
-    fn decide(&self, progress: &mut Progress<'_>) -> Result<Option<StopReason>, icp_registration::Error> {
-        self.0.count(7);
-        let small = progress.step_lengths_m.last().is_some_and(|step| *step < 2e-5);
-        let done = small && progress.step_over_sigma()? < 0.2;
-        Ok(done.then_some(StopReason::Converged))
     }
 }
 
@@ -151,8 +125,6 @@ fn every_part_can_come_from_outside() {
         rejection: vec![Box::new(NotTooFar(&calls))],
         metric: Box::new(PlaneToPoint(&calls)),
         minimisation: Box::new(Cholesky(&calls)),
-        kernel: Box::new(LateTukey(&calls)),
-        stopping: Box::new(SmallSteps(&calls)),
         alternatives: Vec::new(),
         ..Registration::new(NearestPlane(&calls, &target))
     };

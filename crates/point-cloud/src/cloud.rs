@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rigid_pose::{InputError, is_usable, require_length, require_points};
+use statistics::upper_median;
 
 use crate::error::{Error, Result};
 
@@ -98,4 +99,12 @@ impl Cloud {
             None => Ok(()),
         }
     }
+}
+
+/// Medians of the coordinates and of the distances from there, metre, of about `samples` of the points: outliers do not move
+/// them far. NaN without points.
+pub fn middle_and_radius(points: &[Point3<f64>], samples: usize) -> (Vector3<f64>, f64) {
+    let sample = || points.iter().step_by(points.len().div_ceil(samples).max(1));
+    let middle = Vector3::from_fn(|k, _| upper_median(&mut sample().map(|p| p[k]).collect::<Vec<f64>>()));
+    (middle, upper_median(&mut sample().map(|p| (p.coords - middle).norm()).collect::<Vec<f64>>()))
 }

@@ -7,7 +7,7 @@ mod error;
 mod neighbours;
 mod normals;
 
-pub use cloud::Cloud;
+pub use cloud::{Cloud, middle_and_radius};
 pub use eigen::{eigenvalues3, eigenvector3};
 pub use error::Error;
 pub use nalgebra;

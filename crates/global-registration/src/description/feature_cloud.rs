@@ -5,7 +5,7 @@ use rigid_pose::InputError;
 
 use crate::description::descriptors::DescriptorTable;
 use crate::description::features::Features;
-use crate::description::fpfh::fpfh;
+use crate::description::fpfh::{fpfh, subtract};
 use crate::description::labels::Labels;
 use crate::description::reduced::Reduced;
 use crate::description::rsd::{SurfaceRadii, radii, rsd};
@@ -22,11 +22,13 @@ pub(crate) const LEAST_POINTS: usize = 10;
 /// Points that a pose is judged by.
 const SAMPLES: usize = 1500;
 
-/// Points with descriptors of one kind.
+/// A point about a cloud's middle and the unit normal of the surface there; a normal of NaN is unknown.
+pub(crate) type Place = [[f32; 3]; 2];
+
+/// Places about a cloud's middle with descriptors of one kind.
 #[derive(Debug, Clone)]
 pub(crate) struct FeatureSet {
-    pub(crate) points: Vec<[f32; 3]>,
-    pub(crate) normals: Vec<[f32; 3]>,
+    pub(crate) places: Vec<Place>,
     pub(crate) descriptors: DescriptorTable,
 }
 
@@ -41,9 +43,9 @@ pub struct FeatureCloud {
     /// Root mean square distance of the averaged points from their middle, metre.
     pub radius_m: f64,
     viewpoint: Viewpoint,
-    /// One set for each kind of descriptor, in the order of [`SurfaceDescriptors`], then what was added.
+    /// One set for each kind of descriptor, in the order of [`SurfaceDescriptors`], and what was added.
     pub(crate) surface_features: Vec<FeatureSet>,
-    pub(crate) added: Vec<Features>,
+    pub(crate) added: Vec<FeatureSet>,
     /// Points with a normal that a pose is judged by, half of them features.
     pub(crate) sample: Vec<u32>,
     /// Cells of one and of two voxels.
@@ -81,7 +83,7 @@ impl FeatureCloud {
             Labels::new(&reduced.points, is_usable, cells as f32 * voxel)
         });
         let eye = viewpoint.about(&reduced.middle).map(|eye| eye.cast::<f32>().into());
-        let view = eye.and_then(|eye| View::new(&reduced.points, eye, 1.6 * voxel, 2.0 * voxel));
+        let view = eye.map(|eye| View::new(&reduced.points, eye, 1.6 * voxel, 2.0 * voxel));
         let sample = sample(&normals);
         let squares: f64 = reduced.points.iter().flatten().map(|c| f64::from(*c).powi(2)).sum();
         let radius_m = (squares / reduced.len() as f64).sqrt();
@@ -104,7 +106,13 @@ impl FeatureCloud {
     /// cloud's frame. In an alignment, the n-th features added to both clouds are matched with each other.
     #[must_use]
     pub fn with_features(mut self, features: Features) -> Self {
-        self.added.push(features);
+        let place = |point: &Point3<f64>| {
+            let point: [f32; 3] = (point.coords - self.reduced.middle).cast::<f32>().into();
+            let near = self.labels[0].near(point).filter(|_| self.normals.sided);
+            [point, near.map_or([f32::NAN; 3], |near| self.normals.vectors[near])]
+        };
+        let places = features.points.iter().map(place).collect();
+        self.added.push(FeatureSet { places, descriptors: features.table });
         self
     }
 
@@ -144,7 +152,11 @@ impl FeatureCloud {
         let mut cloud = Cloud::new(self.points());
         cloud.normals = Some(self.normals());
         let mut coarse = Self::of_reduced(Reduced::new(&cloud, Some(voxel_m))?, options, self.viewpoint)?;
+        let moved: [f32; 3] = (coarse.reduced.middle - self.reduced.middle).cast::<f32>().into();
         coarse.added.clone_from(&self.added);
+        for [point, _] in coarse.added.iter_mut().flat_map(|set| &mut set.places) {
+            *point = subtract(*point, moved);
+        }
         Ok(coarse)
     }
 
@@ -174,12 +186,8 @@ fn surface_features(
     ];
     let chosen = |table: DescriptorTable| {
         let indices = table.most_distinctive(options.max_features);
-        let take = |values: &[[f32; 3]]| indices.iter().map(|&i| values[i as usize]).collect();
-        FeatureSet {
-            points: take(&reduced.points),
-            normals: take(&normals.vectors),
-            descriptors: table.selected(&indices),
-        }
+        let place = |&i: &u32| [reduced.points[i as usize], normals.vectors[i as usize]];
+        FeatureSet { places: indices.iter().map(place).collect(), descriptors: table.selected(&indices) }
     };
     tables.into_iter().flatten().map(chosen).collect()
 }

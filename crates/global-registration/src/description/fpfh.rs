@@ -24,7 +24,7 @@ pub(crate) const LANES: usize = 16;
 
 /// Descriptors of all points; zeros where a point has no normal or hardly neighbours.
 pub(crate) fn fpfh(points: &[[f32; 3]], normals: &Normals, surroundings: &Surroundings) -> DescriptorTable {
-    let simple = pulp::Arch::new().dispatch(|| simple_histograms(points, normals, surroundings));
+    let simple = pulp::Arch::new().dispatch(Simple { points, normals, surroundings });
     let rows: Vec<[f32; WIDTH]> = (0..points.len())
         .into_par_iter()
         .map(|i| if normals.vectors[i][0].is_nan() { [0.0; WIDTH] } else { averaged(&simple, surroundings, i) })
@@ -33,34 +33,45 @@ pub(crate) fn fpfh(points: &[[f32; 3]], normals: &Normals, surroundings: &Surrou
 }
 
 /// The histograms of each point's own pairs, each summing up to 1. A pair counts for both of its points and is computed
-/// once.
-#[inline(always)]
-fn simple_histograms(points: &[[f32; 3]], normals: &Normals, surroundings: &Surroundings) -> Vec<[f32; WIDTH]> {
-    let mut counts = vec![[0_u16; WIDTH]; points.len()];
-    let mut block = [0_u32; LANES];
-    for i in (0..points.len()).filter(|&i| !normals.vectors[i][0].is_nan()) {
-        let mut filled = 0;
-        for near in surroundings.of(i) {
-            // Written always, kept only if it counts: no branch to be guessed.
-            block[filled] = near.index;
-            let j = near.index as usize;
-            // Every second pair: some forty neighbours fill the histograms as well as eighty.
-            filled += usize::from(j > i && (i + j).is_multiple_of(2) && !normals.vectors[j][0].is_nan());
-            if filled == LANES {
-                add_pairs(points, normals, i, &block, &mut counts);
-                filled = 0;
+/// once. A closure would not be compiled for wide registers.
+struct Simple<'a> {
+    points: &'a [[f32; 3]],
+    normals: &'a Normals,
+    surroundings: &'a Surroundings,
+}
+
+impl pulp::NullaryFnOnce for Simple<'_> {
+    type Output = Vec<[f32; WIDTH]>;
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let Self { points, normals, surroundings } = self;
+        let mut counts = vec![[0_u16; WIDTH]; points.len()];
+        let mut block = [0_u32; LANES];
+        for i in (0..points.len()).filter(|&i| !normals.vectors[i][0].is_nan()) {
+            let mut filled = 0;
+            for near in surroundings.of(i) {
+                // Written always, kept only if it counts: no branch to be guessed.
+                block[filled] = near.index;
+                let j = near.index as usize;
+                // Every second pair: some forty neighbours fill the histograms as well as eighty.
+                filled += usize::from(j > i && (i + j).is_multiple_of(2) && !normals.vectors[j][0].is_nan());
+                if filled == LANES {
+                    add_pairs(points, normals, i, &block, &mut counts);
+                    filled = 0;
+                }
             }
+            add_pairs(points, normals, i, &block[..filled], &mut counts);
         }
-        add_pairs(points, normals, i, &block[..filled], &mut counts);
+        let scaled = |row: [u16; WIDTH]| {
+            let total: u32 = row[..BINS].iter().map(|c| u32::from(*c)).sum();
+            let scale = 1.0 / total.max(1) as f32;
+            let mut row = row.map(|c| f32::from(c) * scale);
+            row[NOWHERE] = 0.0;
+            row
+        };
+        counts.into_iter().map(scaled).collect()
     }
-    let scaled = |row: [u16; WIDTH]| {
-        let total: u32 = row[..BINS].iter().map(|c| u32::from(*c)).sum();
-        let scale = 1.0 / total.max(1) as f32;
-        let mut row = row.map(|c| f32::from(c) * scale);
-        row[NOWHERE] = 0.0;
-        row
-    };
-    counts.into_iter().map(scaled).collect()
 }
 
 #[inline(always)]

@@ -6,7 +6,7 @@ use rigid_pose::InputError;
 use crate::cells::{CellTable, key_of};
 use crate::description::feature_cloud::LEAST_POINTS;
 use crate::error::Result;
-use point_cloud::Cloud;
+use point_cloud::{Cloud, middle_and_radius};
 
 /// Points that the middle and the size of a cloud are taken from.
 const SIZE_SAMPLES: usize = 4096;
@@ -37,7 +37,7 @@ struct Sum {
 impl Reduced {
     /// Averages the points of the voxels; points at the rim are left out.
     pub(crate) fn new(cloud: &Cloud, voxel_m: Option<f64>) -> Result<Self> {
-        let (middle, radius) = middle_and_radius(&cloud.points);
+        let (middle, radius) = middle_and_radius(&cloud.points, SIZE_SAMPLES);
         let mut voxel = voxel_m.unwrap_or_else(|| on_ladder(radius / VOXELS_IN_RADIUS));
         if !(voxel > 0.0 && voxel.is_finite()) {
             return Err(InputError::TooFewPoints { what: "cloud of features", found: 1, needed: LEAST_POINTS }.into());
@@ -113,16 +113,4 @@ impl Reduced {
 /// Nearest power of the square root of two: clouds of like size get the same voxels.
 fn on_ladder(length: f64) -> f64 {
     ((2.0 * length.log2()).round() / 2.0).exp2()
-}
-
-/// Medians of the coordinates and of the distance from there: outliers do not move them far.
-fn middle_and_radius(points: &[Point3<f64>]) -> (Vector3<f64>, f64) {
-    let stride = points.len().div_ceil(SIZE_SAMPLES).max(1);
-    let median = |mut values: Vec<f64>| {
-        let half = values.len() / 2;
-        *values.select_nth_unstable_by(half, f64::total_cmp).1
-    };
-    let sample: Vec<&Point3<f64>> = points.iter().step_by(stride).collect();
-    let middle = Vector3::from_fn(|k, _| median(sample.iter().map(|p| p[k]).collect()));
-    (middle, median(sample.iter().map(|p| (p.coords - middle).norm()).collect()))
 }

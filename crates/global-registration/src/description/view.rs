@@ -1,5 +1,7 @@
 //! What was seen from the viewpoint: ranges by direction on the six faces of a cube.
 
+use statistics::upper_median;
+
 use crate::description::fpfh::{dot, subtract};
 
 /// Most cells along the edge of a face.
@@ -14,9 +16,8 @@ pub(crate) enum Sight {
     InFree,
     /// Where something was seen.
     OnSurface,
-    /// Behind what was seen.
-    Hidden,
-    /// In a direction that nothing is known of, or at a jump of the range where the point may be hidden or not.
+    /// Behind what was seen, in a direction that nothing is known of, or at a jump of the range where the point may be hidden
+    /// or not.
     Unknown,
 }
 
@@ -44,10 +45,8 @@ pub(crate) struct View {
 
 impl View {
     /// Map of `points` seen from `eye`, with cells of about `spacing` at the median range.
-    pub(crate) fn new(points: &[[f32; 3]], eye: [f32; 3], spacing: f32, tolerance: f32) -> Option<Self> {
-        let mut ranges: Vec<f32> = points.iter().map(|p| length(subtract(*p, eye))).collect();
-        let half = ranges.len() / 2;
-        let median = *ranges.get_mut(..)?.select_nth_unstable_by(half, f32::total_cmp).1;
+    pub(crate) fn new(points: &[[f32; 3]], eye: [f32; 3], spacing: f32, tolerance: f32) -> Self {
+        let median = upper_median(&mut points.iter().map(|p| length(subtract(*p, eye))).collect::<Vec<f32>>());
         let edge = (2.0 * median / spacing).clamp(1.0, MOST) as usize;
         let cells = 6 * edge * edge;
         let mut view = Self { eye, edge, nearest: vec![f32::INFINITY; cells], farthest: vec![0.0; cells], tolerance };
@@ -58,7 +57,7 @@ impl View {
         }
         let faces = view.nearest.chunks_exact(edge * edge);
         view.nearest = faces.flat_map(|face| least_around(face, edge)).collect();
-        Some(view)
+        view
     }
 
     /// Whether a surface with this normal turns its back on the viewpoint.
@@ -68,13 +67,12 @@ impl View {
 
     pub(crate) fn sight(&self, point: [f32; 3], jumps: Jumps) -> Sight {
         let Some((cell, range)) = self.cell(point) else { return Sight::Unknown };
-        if self.farthest[cell] <= 0.0 {
+        let (nearest, farthest) = (self.nearest[cell], self.farthest[cell]);
+        if farthest <= 0.0 || range > farthest + self.tolerance {
             Sight::Unknown
-        } else if range < self.nearest[cell] - self.tolerance {
+        } else if range < nearest - self.tolerance {
             Sight::InFree
-        } else if range > self.farthest[cell] + self.tolerance {
-            Sight::Hidden
-        } else if jumps == Jumps::Unknown && self.farthest[cell] > self.nearest[cell] + JUMP * self.tolerance {
+        } else if jumps == Jumps::Unknown && farthest > nearest + JUMP * self.tolerance {
             Sight::Unknown
         } else {
             Sight::OnSurface
@@ -116,5 +114,5 @@ pub(crate) fn least_around(cells: &[f32], edge: usize) -> Vec<f32> {
 }
 
 fn length(d: [f32; 3]) -> f32 {
-    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
+    dot(d, d).sqrt()
 }

@@ -5,39 +5,26 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::description::feature_cloud::Place;
 use crate::description::fpfh::{dot, subtract};
+use point_cloud::SAME_SURFACE_COSINE;
 use rigid_pose::absolute_orientation;
 
 /// Largest difference of the cosines between normals, and of normals with the line between the points, at which two
 /// correspondences agree.
 const COSINE_TOLERANCE: f32 = 0.25;
 
-/// Points and unit normals in one frame; a normal of NaN is unknown.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Side {
-    pub(crate) points: Vec<[f32; 3]>,
-    pub(crate) normals: Vec<[f32; 3]>,
-}
-
-/// Correspondences: entry i of the source belongs to entry i of the target, perhaps.
-#[derive(Debug, Clone, Default)]
+/// Correspondences: a place of the source belongs to one of the target, perhaps.
+#[derive(Debug, Clone)]
 pub(crate) struct Correspondences {
-    pub(crate) source: Side,
-    pub(crate) target: Side,
+    pub(crate) rows: Vec<[Place; 2]>,
     /// The first so many are of the surface, the others were found by other means.
     pub(crate) of_surface: usize,
 }
 
 impl Correspondences {
     pub(crate) fn len(&self) -> usize {
-        self.source.points.len()
-    }
-
-    pub(crate) fn push(&mut self, source: ([f32; 3], [f32; 3]), target: ([f32; 3], [f32; 3])) {
-        self.source.points.push(source.0);
-        self.source.normals.push(source.1);
-        self.target.points.push(target.0);
-        self.target.normals.push(target.1);
+        self.rows.len()
     }
 
     /// Pose that carries the chosen sources onto their targets best. Normals count as points at `arm` metre off the
@@ -45,9 +32,7 @@ impl Correspondences {
     pub(crate) fn solve(&self, members: &[u32], arm: f32) -> Option<Isometry3<f64>> {
         let (mut from, mut to) = (Vec::new(), Vec::new());
         for &i in members {
-            let i = i as usize;
-            let (p, q) = (self.source.points[i], self.target.points[i]);
-            let (n, m) = (self.source.normals[i], self.target.normals[i]);
+            let [[p, n], [q, m]] = self.rows[i as usize];
             from.push(point(p));
             to.push(point(q));
             if !n[0].is_nan() && !m[0].is_nan() {
@@ -73,25 +58,22 @@ impl Correspondences {
         let limit = tolerance * tolerance;
         (0..self.len())
             .filter(|&i| {
-                let difference = subtract(motion.point(self.source.points[i]), self.target.points[i]);
-                let turned = dot(motion.vector(self.source.normals[i]), self.target.normals[i]);
-                dot(difference, difference) <= limit && (turned >= 0.7 || turned.is_nan())
+                let [[p, n], [q, m]] = self.rows[i];
+                let difference = subtract(motion.point(p), q);
+                let turned = dot(motion.vector(n), m);
+                dot(difference, difference) <= limit && (turned >= SAME_SURFACE_COSINE as f32 || turned.is_nan())
             })
             .map(|i| i as u32)
             .collect()
     }
 }
 
-/// Whether one rigid motion can carry the sources of two correspondences (source point and normal, target point and
-/// normal) onto their targets: distance, normals and their angles with the connecting line stay. Two that nearly coincide
+/// Whether one rigid motion can carry the sources of two correspondences onto their targets: distance, normals and their angles with the connecting line stay. Two that nearly coincide
 /// say the same and count as no support. `tolerance`: of distances, metre.
 #[inline(always)]
-pub(crate) fn agree(first: &[f32; 12], second: &[f32; 12], tolerance: f32) -> bool {
-    let three = |row: &[f32; 12], k: usize| [row[k], row[k + 1], row[k + 2]];
-    let d = subtract(three(second, 0), three(first, 0));
-    let e = subtract(three(second, 6), three(first, 6));
-    let (n, m) = (three(first, 3), three(second, 3));
-    let (u, v) = (three(first, 9), three(second, 9));
+pub(crate) fn agree(first: &[Place; 2], second: &[Place; 2], tolerance: f32) -> bool {
+    let ([[p, n], [q, u]], [[r, m], [s, v]]) = (*first, *second);
+    let (d, e) = (subtract(r, p), subtract(s, q));
     let (dd, ee) = (dot(d, d).sqrt(), dot(e, e).sqrt());
     let between = (dot(n, m) - dot(u, v)).abs();
     let at_first = (dot(n, d) - dot(u, e)).abs();
@@ -123,12 +105,12 @@ impl Motion {
 
     #[inline(always)]
     pub(crate) fn vector(&self, v: [f32; 3]) -> [f32; 3] {
-        self.rows.map(|row| dot(row, v))
+        [dot(self.rows[0], v), dot(self.rows[1], v), dot(self.rows[2], v)]
     }
 
     #[inline(always)]
     pub(crate) fn point(&self, p: [f32; 3]) -> [f32; 3] {
-        let turned = self.vector(p);
-        std::array::from_fn(|k| turned[k] + self.shift[k])
+        let [x, y, z] = self.vector(p);
+        [x + self.shift[0], y + self.shift[1], z + self.shift[2]]
     }
 }

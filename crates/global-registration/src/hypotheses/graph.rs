@@ -5,10 +5,12 @@
 //! largest is often that of a wall slid along itself. Seeds and growth are ranked by the number of
 //! common neighbours of two correspondences.
 // Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Lanes lie side by side.
+#![allow(clippy::inline_always, clippy::needless_range_loop)]
 
 use rayon::prelude::*;
 
+use crate::description::feature_cloud::Place;
 use crate::hypotheses::correspondences::{Correspondences, agree};
 
 /// Fewest members of a clique.
@@ -27,12 +29,7 @@ impl ConsistencyGraph {
         let mut rows = vec![0; count * words];
         let blocks = blocks(correspondences);
         rows.par_chunks_mut(words).with_min_len(64).enumerate().for_each(|(i, row)| {
-            let own = columns(correspondences, i);
-            pulp::Arch::new().dispatch(|| {
-                for (bits, block) in row.iter_mut().zip(&blocks) {
-                    *bits = agreeing(&own, block, tolerance);
-                }
-            });
+            pulp::Arch::new().dispatch(Row { own: &correspondences.rows[i], blocks: &blocks, tolerance, bits: row });
         });
         Self { words, rows }
     }
@@ -103,29 +100,37 @@ type Block = [[f32; 64]; 12];
 fn blocks(correspondences: &Correspondences) -> Vec<Block> {
     // What pads the last block agrees with nothing.
     let mut blocks = vec![[[f32::NAN; 64]; 12]; correspondences.len().div_ceil(64)];
-    for i in 0..correspondences.len() {
-        for (column, value) in columns(correspondences, i).into_iter().enumerate() {
-            blocks[i / 64][column][i % 64] = value;
+    for (i, row) in correspondences.rows.iter().enumerate() {
+        for (column, value) in row.as_flattened().as_flattened().iter().enumerate() {
+            blocks[i / 64][column][i % 64] = *value;
         }
     }
     blocks
 }
 
-fn columns(correspondences: &Correspondences, i: usize) -> [f32; 12] {
-    let (s, t) = (&correspondences.source, &correspondences.target);
-    let groups = [s.points[i], s.normals[i], t.points[i], t.normals[i]];
-    std::array::from_fn(|k| groups[k / 3][k % 3])
+/// The bits of one correspondence against all others, 64 at a time. A closure would not be compiled for wide registers.
+struct Row<'a> {
+    own: &'a [Place; 2],
+    blocks: &'a [Block],
+    tolerance: f32,
+    bits: &'a mut [u64],
 }
 
-/// The bits of one correspondence against 64 others.
-#[inline(always)]
-fn agreeing(own: &[f32; 12], block: &Block, tolerance: f32) -> u64 {
-    let mut flags = [0_u32; 64];
-    for lane in 0..64 {
-        let other: [f32; 12] = std::array::from_fn(|k| block[k][lane]);
-        flags[lane] = u32::from(agree(own, &other, tolerance));
+impl pulp::NullaryFnOnce for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (bits, block) in self.bits.iter_mut().zip(self.blocks) {
+            let mut flags = [0_u32; 64];
+            for lane in 0..64 {
+                let vector = |k: usize| [block[k][lane], block[k + 1][lane], block[k + 2][lane]];
+                let other = [[vector(0), vector(3)], [vector(6), vector(9)]];
+                flags[lane] = u32::from(agree(self.own, &other, self.tolerance));
+            }
+            *bits = flags.iter().enumerate().fold(0, |bits, (lane, flag)| bits | u64::from(*flag) << lane);
+        }
     }
-    flags.iter().enumerate().fold(0, |bits, (lane, flag)| bits | u64::from(*flag) << lane)
 }
 
 fn members(row: &[u64]) -> impl Iterator<Item = usize> + '_ {

@@ -6,7 +6,7 @@ use crate::description::feature_cloud::FeatureCloud;
 use crate::description::view::Jumps;
 use crate::error::Result;
 use crate::options::CoarseOptions;
-use crate::verification::judge::{Count, Verdict};
+use crate::verification::judge::Verdict;
 use crate::verification::refine;
 
 /// The clouds in voxels of one size, that of the coarsest.
@@ -51,8 +51,7 @@ pub fn agreement_of_rooms(a: &Placed<'_>, b: &Placed<'_>) -> (usize, usize) {
 
 fn counted(a: &Placed<'_>, b: &Placed<'_>, jumps: Jumps) -> (usize, usize) {
     let verdict = verdict(a, b, 1, jumps);
-    let sum = |of: fn(&Count) -> usize| of(&verdict.source) + of(&verdict.target);
-    (sum(|c| c.hits), sum(|c| c.in_free + c.missed))
+    (verdict.hits, verdict.in_free + verdict.missed)
 }
 
 /// Brings a cloud that is nearly in place onto all those around it, point to plane.

@@ -14,8 +14,7 @@ use crate::options::CoarseOptions;
 use crate::verification::judge::{Verdict, partner, unevenness};
 use crate::verification::shared_error::{Errors, Misses, Residual, errors};
 
-/// Points that are looked for behind a tangent plane, the share that must lie there, and how far, voxels.
-const WITNESSES: usize = 256;
+/// Share of the sampled points that must lie behind a tangent plane, and how far, voxels.
 const LEAST_BEHIND: f64 = 0.02;
 const BEHIND_VOXELS: f32 = 3.0;
 /// Pairs that planes are made from.
@@ -67,8 +66,7 @@ impl Common {
         let forward = pairs(source, target, pose);
         let backward = pairs(target, source, &pose.inverse());
         let count = |from: &FeatureCloud, to: &FeatureCloud, pairs: &[[usize; 2]]| {
-            let (own, other) = (witnesses(from), witnesses(to));
-            let inside = pairs.iter().filter(|p| is_inside(from, &own, p[0]) && is_inside(to, &other, p[1])).count();
+            let inside = pairs.iter().filter(|p| is_inside(from, p[0]) && is_inside(to, p[1])).count();
             inside as f64 / from.sample.len().max(1) as f64
         };
         let inside = count(source, target, &forward).min(count(target, source, &backward));
@@ -149,17 +147,13 @@ fn pairs(from: &FeatureCloud, to: &FeatureCloud, pose: &Isometry3<f64>) -> Vec<[
     from.sample.iter().filter_map(of).collect()
 }
 
-fn witnesses(cloud: &FeatureCloud) -> Vec<[f32; 3]> {
-    let stride = cloud.sample.len().div_ceil(WITNESSES).max(1);
-    cloud.sample.iter().step_by(stride).map(|&i| cloud.reduced.points[i as usize]).collect()
-}
-
 /// Whether the cloud goes on behind a point's tangent plane; where normals have no side, nothing encloses.
-fn is_inside(cloud: &FeatureCloud, witnesses: &[[f32; 3]], i: usize) -> bool {
+fn is_inside(cloud: &FeatureCloud, i: usize) -> bool {
     let (point, normal) = (cloud.reduced.points[i], cloud.normals.vectors[i]);
     let margin = BEHIND_VOXELS * cloud.reduced.voxel_m as f32;
-    let is_behind = |q: &&[f32; 3]| dot(subtract(**q, point), normal) < -margin;
-    !cloud.normals.sided || witnesses.iter().filter(is_behind).count() as f64 > LEAST_BEHIND * witnesses.len() as f64
+    let is_behind = |q: &&u32| dot(subtract(cloud.reduced.points[**q as usize], point), normal) < -margin;
+    let least = (LEAST_BEHIND * cloud.sample.len() as f64) as usize;
+    !cloud.normals.sided || cloud.sample.iter().filter(is_behind).nth(least).is_some()
 }
 
 /// Normal matrix of the planes that partners form: noise of single normals imitates resistance against sliding along walls,

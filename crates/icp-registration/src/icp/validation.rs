@@ -9,26 +9,20 @@ use crate::result::DegeneracyPolicy;
 
 impl Registration<'_> {
     pub(super) fn validate(&self, scene: &Scene<'_>) -> Result<()> {
-        self.matching.validate()?;
         self.metric.validate(scene)?;
-        self.minimisation.validate(scene, &*self.metric)?;
-        self.kernel.validate()?;
+        self.minimisation.validate(&*self.metric)?;
         self.stopping.validate()?;
         self.levels.validate()?;
         self.starts.map_or(Ok(()), |starts| starts.validate())?;
         for alternative in &self.alternatives {
-            alternative.kernel.validate()?;
             if let Some(metric) = &alternative.metric {
                 metric.validate(scene)?;
-                self.minimisation.validate(scene, &**metric)?;
+                self.minimisation.validate(&**metric)?;
             }
         }
         let elsewhere = self.alternatives.iter().flat_map(|alternative| &alternative.rejection);
         for rejection in self.rejection.iter().chain(elsewhere) {
-            rejection.validate(scene)?;
-        }
-        for weighting in &self.weighting {
-            weighting.validate()?;
+            rejection.validate()?;
         }
         if self.degeneracy == DegeneracyPolicy::HoldAtPrior {
             prior::validate(self.prior_covariance.as_ref())?;

@@ -2,16 +2,13 @@
 //!
 //! | question | trait | answers here |
 //! |---|---|---|
-//! | which points? | [`PointSelection`] | [`AllPoints`], [`EveryNth`], [`RandomPoints`], [`NormalSpace`], [`Stability`] |
-//! | which partner? | [`PointMatching`] | [`NearestPoint`], [`CompatibleNearest`], [`Projective`], `ClosestOnMesh` (feature `mesh`) |
-//! | how much weight? | [`PairWeighting`] | [`ConstantWeight`], [`DistanceWeight`], [`NormalWeight`], [`SigmaWeight`], [`IntensityWeight`] |
-//! | which pairs not? | [`PairRejection`] | [`MaxDistance`], [`MaxNormalAngle`], [`Trimmed`], [`MedianDistance`], [`SourceRim`], [`TargetRim`], [`MutualNearest`] |
+//! | which points? | [`PointSelection`] | [`Selection`] |
+//! | which partner? | [`PointMatching`] | [`NearestPoint`], `ClosestOnMesh` (feature `mesh`) |
+//! | how much weight? | [`PairWeighting`] | [`SigmaWeight`] |
+//! | which pairs not? | [`PairRejection`] | [`MaxNormalAngle`], [`Trimmed`], [`TargetRim`] |
 //! | what is minimised? | [`ErrorMetric`] | [`PointToPoint`], [`PointToPlane`], [`SymmetricPlanes`], [`PlaneToPlane`], [`Coloured`] |
-//! | how? | [`Minimiser`] | [`GaussNewton`], [`LevenbergMarquardt`], [`ClosedForm`] |
-//! | what of outliers? | [`KernelSchedule`] | [`crate::RobustKernel`], [`Graduated`] |
-//! | until when? | [`StoppingRule`] | [`Settled`] |
+//! | how? | [`Minimiser`] | [`GaussNewton`], [`ClosedForm`] |
 
-mod kernel;
 mod matching;
 #[cfg(feature = "mesh")]
 mod mesh;
@@ -20,20 +17,15 @@ mod minimisation;
 mod rejection;
 mod scene;
 mod selection;
-mod stopping;
 mod weighting;
 
-pub use kernel::{Graduated, KernelSchedule};
-pub use matching::{CompatibleNearest, NearestPoint, Partner, PointMatching, Projective, Query};
+pub use matching::{NearestPoint, Partner, PointMatching, Query};
 #[cfg(feature = "mesh")]
 pub use mesh::{ClosestOnMesh, TriangleMesh};
 pub use metric::{Coloured, ErrorMetric, PlaneToPlane, PointToPlane, PointToPoint, Row, Rows, SymmetricPlanes};
-pub use minimisation::{ClosedForm, GaussNewton, LevenbergMarquardt, Minimiser};
-pub use rejection::{
-    MaxDistance, MaxNormalAngle, MedianDistance, MutualNearest, PairRejection, SourceRim, TargetRim, Trimmed,
-};
+pub use minimisation::{ClosedForm, GaussNewton, Minimiser};
+pub use rejection::{MaxNormalAngle, PairRejection, TargetRim, Trimmed};
 pub use scene::{Moment, Pair, Scene, TargetSurface};
 pub(crate) use selection::thinned;
-pub use selection::{AllPoints, EveryNth, NormalSpace, PointSelection, RandomPoints, Stability};
-pub use stopping::{Progress, Settled, StoppingRule};
-pub use weighting::{ConstantWeight, DistanceWeight, IntensityWeight, NormalWeight, PairWeighting, SigmaWeight};
+pub use selection::{PointSelection, Selection};
+pub use weighting::{PairWeighting, SigmaWeight};

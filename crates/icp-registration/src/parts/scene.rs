@@ -59,12 +59,6 @@ pub struct Moment {
     pub pose: Isometry3<f64>,
     /// Largest distance of a pair, metre.
     pub limit_m: f64,
-    /// Level from coarse (0) to fine.
-    pub level: usize,
-    /// Number of levels; the last of them is the one that settles.
-    pub levels: usize,
-    /// Iteration within the level, counted from 0.
-    pub iteration: usize,
     /// Whether the run has ended and the pose is only being judged.
     pub ended: bool,
 }

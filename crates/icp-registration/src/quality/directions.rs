@@ -9,6 +9,8 @@ use rigid_pose::{Centred, eigen6, free_of, symmetrised};
 
 /// Information below this multiple of its own scatter between cells counts as none.
 pub const SIGNIFICANCE: f64 = 2.5;
+/// Share of the radius beyond whose standard deviation a motion is undetermined, where nothing else is said.
+pub const OPEN: f64 = 1.0 / 300.0;
 /// Cells below which their scatter is no estimate.
 pub const FEWEST_CELLS: usize = 20;
 
@@ -71,11 +73,6 @@ impl Directions {
     /// All six, worst first.
     pub fn all(&self) -> &[Direction] {
         &self.all
-    }
-
-    /// Orthonormal undetermined motions `[dt, rho w]`.
-    pub fn held(&self) -> impl Iterator<Item = Vector6<f64>> {
-        self.all.iter().filter(|d| !d.determined).map(|d| d.vector)
     }
 
     /// Projection on the determined motions.

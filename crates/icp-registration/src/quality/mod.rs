@@ -13,15 +13,6 @@ mod motion;
 mod verdict;
 
 pub(crate) use cells::Cells;
-pub use directions::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
+pub use directions::{Direction, Directions, FEWEST_CELLS, OPEN, SIGNIFICANCE, expanded};
 pub use motion::{MotionKind, UndeterminedMotion};
-pub(crate) use verdict::{ROUNDING, Verdict};
-
-/// What the residuals consist of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Residuals {
-    /// The surfaces are still apart: what neighbouring residuals share is no error, and would hold what can be solved.
-    Misaligned,
-    /// Errors: what neighbouring residuals share counts.
-    Settled,
-}
+pub(crate) use verdict::{Free, ROUNDING, Verdict};

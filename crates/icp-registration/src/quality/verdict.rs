@@ -1,8 +1,7 @@
 //! Covariance and verdict from the sums over cells.
 
-use nalgebra::{DMatrix, Isometry3, Matrix6, Vector6};
+use nalgebra::{DMatrix, Isometry3, Matrix6, Point3, Vector6};
 
-use super::Residuals;
 use super::cells::Cells;
 use super::directions::{Direction, Directions, SIGNIFICANCE, expanded};
 use crate::error::Result;
@@ -15,6 +14,22 @@ pub(crate) const ROUNDING: f64 = 1e-9;
 /// a half).
 const RESPONSE: std::ops::Range<f64> = 0.25..2.0;
 
+/// The motions that steps may take.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Free {
+    /// The frame that they are told in; `None`: that of the pairs, whatever these are.
+    pub frame: Option<Centred>,
+    /// Projection on them.
+    pub projection: Matrix6<f64>,
+}
+
+impl Free {
+    /// All motions.
+    pub fn all() -> Self {
+        Self { frame: None, projection: Matrix6::identity() }
+    }
+}
+
 /// What pairs say about a pose.
 pub(crate) struct Verdict {
     frame: Centred,
@@ -23,19 +38,24 @@ pub(crate) struct Verdict {
 
 impl Verdict {
     /// Judges the pairs; motions with a predicted sigma above `max_sigma_m` are undetermined.
-    pub fn new(cells: &Cells, max_sigma_m: f64, residuals: Residuals) -> Result<Self> {
-        let score = |inverse: &Matrix6<f64>| match residuals {
-            Residuals::Misaligned => (cells.independent_scores(), 1.0),
-            Residuals::Settled => cells.clustered_scores(inverse),
-        };
+    pub fn new(cells: &Cells, max_sigma_m: f64) -> Result<Self> {
+        let score = |inverse: &Matrix6<f64>| cells.clustered_scores(inverse);
         let significant = |motion: &Vector6<f64>, information| information > SIGNIFICANCE * cells.scatter(motion);
         let directions = Directions::new(&cells.information(), score, significant, ROUNDING, max_sigma_m)?;
         Ok(Self { frame: cells.frame, directions })
     }
 
-    /// Orthonormal undetermined motions `[dt, rho w]`.
-    pub fn held(&self) -> Vec<Vector6<f64>> {
-        self.directions.held().collect()
+    /// The pose without what happened along undetermined motions since the guess, and the motions that may still be taken;
+    /// `None` where all motions are determined.
+    ///
+    /// What a motion is worth shows at the answer only: far off, and between coarse levels, everything seems to matter.
+    pub fn back_at(&self, guess: &Isometry3<f64>, pose: &Isometry3<f64>) -> Option<(Isometry3<f64>, Free)> {
+        let (frame, projection) = (self.frame, self.directions.free());
+        let slide = (guess * pose.inverse() * Point3::from(frame.centre)).coords - frame.centre;
+        let turn = (guess.rotation * pose.rotation.inverse()).scaled_axis() * frame.radius_m;
+        let back = Vector6::new(slide.x, slide.y, slide.z, turn.x, turn.y, turn.z);
+        let all = self.directions.all().iter().all(|d| d.determined);
+        (!all).then(|| (frame.moved(pose, &(back - projection * back)), Free { frame: Some(frame), projection }))
     }
 
     /// A step `[dt, rho w]` over the standard deviation, along the determined motion where that is largest.
@@ -61,18 +81,6 @@ impl Verdict {
         }
         let to_tangent = self.frame.tangent_from_motion(pose);
         symmetrised(&(to_tangent * centred * to_tangent.transpose()))
-    }
-
-    /// Inverse of the covariance along the determined motions, zero along the others; in the tangent of
-    /// [`Verdict::covariance`].
-    pub fn information(&self, pose: &Isometry3<f64>, response: &Matrix6<f64>) -> Matrix6<f64> {
-        let known: Vec<&Direction> = self.directions.all().iter().filter(|d| d.determined).collect();
-        let (basis, inside) = self.directions.sandwich(&known, |basis| inverse_response(&known, basis, response));
-        let inverse = inside.try_inverse().unwrap_or_else(|| DMatrix::zeros(known.len(), known.len()));
-        let centred = expanded(&basis, &inverse);
-        let to_tangent = self.frame.tangent_from_motion(pose);
-        let from_tangent = to_tangent.try_inverse().unwrap_or_else(Matrix6::zeros);
-        symmetrised(&(from_tangent.transpose() * centred * from_tangent))
     }
 }
 

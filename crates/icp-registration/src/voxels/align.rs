@@ -1,23 +1,22 @@
 //! The registration of two clouds of voxels.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+use nalgebra::Isometry3;
 
 use super::cloud::VoxelCloud;
+use super::level::Level;
 use super::options::VoxelAlignmentOptions;
 use super::pairs::{Matcher, Pair, Partners, System, matched};
 use super::wide::{RULES, Wide};
 use crate::error::Result;
 use crate::kernel::RobustKernel;
-use crate::quality::{Cells, Residuals, Verdict};
+use crate::quality::{Cells, Free, OPEN, Verdict};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
-use rigid_pose::{Centred, InputError, free_of, motion_length, require_pose};
+use rigid_pose::{InputError, motion_length, require_pose};
 
 /// Partners of a level are not looked for anew when a step is below this fraction of its voxels, and after so many steps in any
 /// case: a coarse level ends then, in the finest one they are kept.
 const SETTLED_STEP: f64 = 0.02;
 const MOST_SEARCHES: usize = 15;
-/// Planes of a level below which it is passed over.
-const FEWEST_PLANES: usize = 100;
 /// Least size of those cells: planes of voxels nearer than three share points.
 const VOXELS_PER_CELL: f64 = 6.0;
 
@@ -39,7 +38,7 @@ impl VoxelCloud {
         options.validate()?;
         require_pose("the guess", guess)?;
         let (pairs, scratch) = (Vec::new(), Vec::new());
-        let run = Run { target: self, source, options, pose: *guess, iterations: 0, held: None, pairs, scratch };
+        let run = Run { target: self, source, options, pose: *guess, iterations: 0, free: Free::all(), pairs, scratch };
         run.finish(guess)
     }
 }
@@ -50,8 +49,8 @@ struct Run<'a> {
     options: &'a VoxelAlignmentOptions,
     pose: Isometry3<f64>,
     iterations: usize,
-    /// Motions that stay as they are, in a frame that stays too.
-    held: Option<(Centred, Matrix6<f64>)>,
+    /// Motions that do not stay as they are, in a frame that stays.
+    free: Free,
     pairs: Vec<Pair>,
     scratch: Vec<f64>,
 }
@@ -60,12 +59,17 @@ impl<'a> Run<'a> {
     fn finish(mut self, guess: &Isometry3<f64>) -> Result<IcpResult> {
         let mut matchers = self.matchers();
         self.approach(&mut matchers)?;
+        let least_squares = self.options.kernel == RobustKernel::None;
+        let coarse = if least_squares { RobustKernel::None } else { RobustKernel::Cauchy };
         for matcher in &matchers[..matchers.len() - 1] {
-            self.level(*matcher)?;
+            self.search(*matcher, coarse)?;
         }
         let last = matchers[matchers.len() - 1];
         let mut stop = self.settle(last)?;
-        if self.options.degeneracy == DegeneracyPolicy::HoldAtGuess && self.return_to(guess, last)? {
+        if self.options.degeneracy == DegeneracyPolicy::HoldAtGuess
+            && let Some((pose, free)) = self.verdict(last)?.back_at(guess, &self.pose)
+        {
+            (self.pose, self.free) = (pose, free);
             stop = self.settle(last)?;
         }
         self.result(last, stop)
@@ -74,22 +78,13 @@ impl<'a> Run<'a> {
     /// Levels of the source from coarse to fine, each with the target's level of the most similar size.
     fn matchers(&self) -> Vec<Matcher<'a>> {
         let (target, source) = (self.target, self.source);
-        let planes = |m: &Matcher<'_>| m.source.voxels.iter().filter(|v| v.variance < f64::INFINITY).count();
-        let mut matchers: Vec<Matcher<'a>> = source
-            .levels
-            .iter()
-            .map(|level| {
-                let unlike = |other: f64| (other / level.size_m).ln().abs();
-                let nearest = target.levels.iter().min_by(|a, b| unlike(a.size_m).total_cmp(&unlike(b.size_m)));
-                let nearest = nearest.unwrap_or(&target.levels[0]);
-                Matcher { source: level, target: nearest, target_lattice: &target.lattice }
-            })
-            .collect();
-        while matchers.len() > 1 && matchers.last().is_some_and(|m| planes(m) < FEWEST_PLANES) {
-            matchers.pop();
-        }
-        matchers.reverse();
-        matchers
+        let matcher = |level: &'a Level| {
+            let unlike = |other: f64| (other / level.size_m).ln().abs();
+            let nearest = target.levels.iter().min_by(|a, b| unlike(a.size_m).total_cmp(&unlike(b.size_m)));
+            let nearest = nearest.unwrap_or(&target.levels[0]);
+            Matcher { source: level, target: nearest, target_lattice: &target.lattice }
+        };
+        source.levels.iter().rev().map(matcher).collect()
     }
 
     /// Brings the pose to where the first of the levels that are left can find partners.
@@ -130,78 +125,48 @@ impl<'a> Run<'a> {
         System::new(&self.pairs, kernel, &mut self.scratch)
     }
 
-    /// Iterates on a coarse level.
-    fn level(&mut self, matcher: Matcher<'_>) -> Result<()> {
+    /// Iterates while partners change; the length of the last step, metre.
+    fn search(&mut self, matcher: Matcher<'_>, kernel: RobustKernel) -> Result<f64> {
+        let mut step_m = f64::INFINITY;
         for _ in 0..MOST_SEARCHES {
-            let kernel =
-                if self.options.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Cauchy };
-            let step = self.step(matcher, Partners::Anew, kernel)?;
-            if motion_length(&step) < SETTLED_STEP * matcher.target.size_m {
+            step_m = self.step(matcher, Partners::Anew, kernel)?;
+            if step_m < SETTLED_STEP * matcher.target.size_m {
                 break;
             }
         }
-        Ok(())
+        Ok(step_m)
     }
 
     /// Iterates on the finest level.
     fn settle(&mut self, matcher: Matcher<'_>) -> Result<StopReason> {
-        let tolerance = self.options.step_tolerance_m.unwrap_or(1e-5 * self.target.radius_m);
-        let (mut partners, mut searches) = (Partners::Anew, 0);
-        while searches == 0 || self.iterations < self.options.max_iterations {
-            let step = motion_length(&self.step(matcher, partners, self.options.kernel)?);
-            if step <= tolerance {
-                return Ok(StopReason::Converged);
+        let tolerance_m = self.options.step_tolerance_m.unwrap_or(1e-5 * self.target.radius_m);
+        let mut step_m = self.search(matcher, self.options.kernel)?;
+        while step_m > tolerance_m {
+            if self.iterations >= self.options.max_iterations {
+                return Ok(StopReason::MaxIterations);
             }
-            searches += 1;
-            if step < SETTLED_STEP * matcher.target.size_m || searches >= MOST_SEARCHES {
-                partners = Partners::Kept;
-            }
+            step_m = self.step(matcher, Partners::Kept, self.options.kernel)?;
         }
-        Ok(StopReason::MaxIterations)
+        Ok(StopReason::Converged)
     }
 
-    /// Takes back what happened along undetermined motions, and holds them from now on; whether there are any.
-    ///
-    /// What a motion is worth shows at the answer only: far off, and between large voxels, everything seems to matter.
-    fn return_to(&mut self, guess: &Isometry3<f64>, matcher: Matcher<'_>) -> Result<bool> {
-        let (pose, iteration, kernel) = (self.pose, self.iterations, self.options.kernel);
-        let max_sigma_m = self.max_motion_sigma_m();
-        let system = self.enough(matcher, &pose, Partners::Anew, kernel, iteration)?;
-        let (frame, cells) = (system.frame, system.cells(matcher.target, cell(&system, matcher)));
-        let held = Verdict::new(&cells, max_sigma_m, Residuals::Settled)?.held();
-        let slide = (guess * pose.inverse() * Point3::from(frame.centre)).coords - frame.centre;
-        let turn = (guess.rotation * pose.rotation.inverse()).scaled_axis() * frame.radius_m;
-        let back = Vector6::new(slide.x, slide.y, slide.z, turn.x, turn.y, turn.z);
-        let free = free_of(&held);
-        let back = back - free * back;
-        self.pose = frame.moved(&pose, &back);
-        self.held = Some((frame, free));
-        Ok(!held.is_empty())
-    }
-
-    fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<Vector6<f64>> {
-        let (pose, iteration, held) = (self.pose, self.iterations, self.held);
-        let mut system = self.enough(matcher, &pose, partners, kernel, iteration)?;
-        let (frame, free) = held.unwrap_or_else(|| (system.frame, Matrix6::identity()));
-        system.frame = frame;
-        let mut step = system.step(&free)?;
+    /// One step; its length, metre.
+    fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<f64> {
+        let (pose, free) = (self.pose, self.free);
+        let mut system = self.enough(matcher, partners, kernel)?;
+        system.frame = free.frame.unwrap_or(system.frame);
+        let frame = system.frame;
+        let mut step = system.step(&free.projection)?;
         // Partners give no reason to move farther than they can be apart.
         step /= (motion_length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
         self.pose = frame.moved(&pose, &step);
         self.iterations += 1;
-        Ok(step)
+        Ok(motion_length(&step))
     }
 
-    fn enough(
-        &mut self,
-        matcher: Matcher<'_>,
-        pose: &Isometry3<f64>,
-        partners: Partners,
-        kernel: RobustKernel,
-        iteration: usize,
-    ) -> Result<System<'_>> {
-        let needed = self.options.min_correspondences;
-        let system = self.system(matcher, pose, partners, kernel);
+    fn enough(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<System<'_>> {
+        let (pose, iteration, needed) = (self.pose, self.iterations, self.options.min_correspondences);
+        let system = self.system(matcher, &pose, partners, kernel);
         if system.count < needed {
             let (found, of, max_distance_m) = (system.count, matcher.source.voxels.len(), matcher.limit_m());
             return Err(InputError::TooFewCorrespondences { found, of, needed, max_distance_m, iteration }.into());
@@ -209,35 +174,29 @@ impl<'a> Run<'a> {
         Ok(system)
     }
 
-    fn max_motion_sigma_m(&self) -> f64 {
-        self.options.max_motion_sigma_m.unwrap_or(self.target.radius_m / 300.0)
+    /// What the pairs of the pose say about it.
+    fn verdict(&mut self, matcher: Matcher<'_>) -> Result<Verdict> {
+        let max_sigma_m = self.options.max_motion_sigma_m.unwrap_or(OPEN * self.target.radius_m);
+        let system = self.enough(matcher, Partners::Anew, self.options.kernel)?;
+        let cell_m = (system.frame.radius_m / Cells::PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m);
+        Verdict::new(&system.cells(matcher.target, cell_m), max_sigma_m)
     }
 
     fn result(mut self, matcher: Matcher<'_>, stop: StopReason) -> Result<IcpResult> {
-        let (pose, iterations, max_sigma_m) = (self.pose, self.iterations, self.max_motion_sigma_m());
-        let (kernel, points) = (self.options.kernel, self.source.points as f64);
-        let system = self.enough(matcher, &pose, Partners::Anew, kernel, iterations)?;
-        let cells = system.cells(matcher.target, cell(&system, matcher));
-        let verdict = Verdict::new(&cells, max_sigma_m, Residuals::Settled)?;
-        let (rms_m, correspondences, degenerate) = (system.rms_m(), system.count, verdict.undetermined());
-        let covariance = verdict.covariance(&pose, None);
+        let verdict = self.verdict(matcher)?;
+        let system = System::new(&self.pairs, self.options.kernel, &mut self.scratch);
         let seen: f64 = matched(&self.pairs).map(|p| p.count).sum();
         Ok(IcpResult {
-            target_from_source: pose,
-            covariance,
+            target_from_source: self.pose,
+            covariance: verdict.covariance(&self.pose, None),
             // A voxel between two surfaces counts for both.
-            overlap: (seen / points).min(1.0),
-            rms_m,
-            iterations,
+            overlap: (seen / self.source.points as f64).min(1.0),
+            rms_m: system.rms_m(),
+            iterations: self.iterations,
             stop,
-            correspondences,
+            correspondences: system.count,
             max_correspondence_distance_m: matcher.limit_m(),
-            degenerate,
+            degenerate: verdict.undetermined(),
         })
     }
-}
-
-/// Size of the cubes whose pairs count as one observation, metre.
-fn cell(system: &System<'_>, matcher: Matcher<'_>) -> f64 {
-    (system.frame.radius_m / Cells::PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m)
 }

@@ -10,8 +10,8 @@ use super::scale::voxel_size;
 use crate::error::Result;
 use point_cloud::Cloud;
 
-/// Levels end when so few voxels are left.
-const FEWEST_VOXELS: usize = 150;
+/// Planes of a level below which it is of no use: it tells a pose too badly.
+const FEWEST_PLANES: usize = 100;
 /// Levels that the lattice leaves room for.
 const MOST_LEVELS: usize = 8;
 
@@ -51,11 +51,12 @@ impl VoxelCloud {
             return Err(InputError::Empty { what: "the cloud without its rim" }.into());
         }
         let mut levels = vec![Level::finest(&lattice, keys, moments)];
-        while let Some(last) = levels.last()
-            && last.voxels.len() > FEWEST_VOXELS
-            && levels.len() < MOST_LEVELS
-        {
-            levels.push(last.coarser(&lattice));
+        while levels.len() < MOST_LEVELS {
+            let coarser = levels[levels.len() - 1].coarser(&lattice);
+            if coarser.planes().count() < FEWEST_PLANES {
+                break;
+            }
+            levels.push(coarser);
         }
         let radius_m = radius(&levels[0]);
         Ok(Self { lattice, levels, points: cloud.len(), radius_m })

@@ -78,6 +78,11 @@ impl Level {
         Self { size_m, factor, keys, moments, blocks, voxels }
     }
 
+    /// The voxels that have a plane.
+    pub fn planes(&self) -> impl Iterator<Item = &Voxel> {
+        self.voxels.iter().filter(|voxel| voxel.variance < f64::INFINITY)
+    }
+
     /// Index of the voxel nearest to `moved` whose normal agrees with `normal`, among the eight cells around it.
     #[inline]
     pub fn partner(&self, lattice: &Lattice, moved: &Point3<f64>, normal: &Vector3<f64>) -> Option<usize> {

@@ -5,10 +5,11 @@
 //! near it: the typical point counts, not the typical voxel.
 
 use nalgebra::Point3;
-use statistics::upper_median;
+use point_cloud::middle_and_radius;
 
-use super::numerics::gather::{Sum, gather};
+use super::numerics::gather::gather;
 use super::numerics::lattice::{Bounds, Lattice};
+use super::numerics::moments::Moments;
 use crate::error::Result;
 
 /// Points looked at.
@@ -29,7 +30,7 @@ const GROWTH: f64 = 1.05;
 /// Edge of the voxels, metre: the voxel of a typical point holds about eight, but there are at most about 10 000 voxels.
 pub(crate) fn voxel_size(points: &[Point3<f64>], (low, high): &Bounds) -> Result<f64> {
     let sample: Vec<Point3<f64>> = points.iter().copied().step_by(points.len().div_ceil(SAMPLE).max(1)).collect();
-    let (radius, extent) = (radius(&sample), (high - low).amax());
+    let (radius, extent) = (middle_and_radius(&sample, SAMPLE).1, (high - low).amax());
     if extent <= 0.0 {
         // All points in one place: any size will do.
         return Ok(1.0);
@@ -66,29 +67,8 @@ fn typical(counts: &[f64]) -> f64 {
         .unwrap_or(1.0)
 }
 
-/// Median distance from the median position.
-fn radius(sample: &[Point3<f64>]) -> f64 {
-    let middle = [0, 1, 2].map(|k| upper_median(&mut sample.iter().map(|p| p[k]).collect::<Vec<_>>()));
-    let middle = Point3::from(middle);
-    upper_median(&mut sample.iter().map(|p| (p - middle).norm()).collect::<Vec<_>>())
-}
-
-#[derive(Debug, Default, Clone)]
-struct Count(f64);
-
-impl Sum for Count {
-    type Source<'a> = ();
-
-    fn add(&mut self, _: usize, _: [f64; 3], (): &()) {
-        self.0 += 1.0;
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.0 += other.0;
-    }
-}
-
+/// Points in each occupied cell.
 fn counted(sample: &[Point3<f64>], size_m: f64) -> Result<Vec<f64>> {
     let lattice = Lattice::new(sample, size_m)?;
-    Ok(gather::<Count>(sample, &lattice, |_| true, &()).1.into_iter().map(|count| count.0).collect())
+    Ok(gather::<Moments>(sample, &lattice, |_| true, &()).1.into_iter().map(|moments| moments.count).collect())
 }

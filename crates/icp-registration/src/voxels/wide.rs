@@ -93,15 +93,6 @@ impl Wide {
 
 /// Planes evenly from the coarsest level that has enough of them.
 fn sample(levels: &[Level], wanted: usize) -> Vec<Voxel> {
-    let planes =
-        |level: &Level| level.voxels.iter().filter(|v| v.variance < f64::INFINITY).copied().collect::<Vec<_>>();
-    let mut found = Vec::new();
-    for level in levels.iter().rev() {
-        found = planes(level);
-        if found.len() >= FEWEST_PLANES {
-            break;
-        }
-    }
-    let stride = found.len().div_ceil(wanted).max(1);
-    found.into_iter().step_by(stride).collect()
+    let level = levels.iter().rev().find(|level| level.planes().count() >= FEWEST_PLANES).unwrap_or(&levels[0]);
+    level.planes().copied().step_by(level.planes().count().div_ceil(wanted).max(1)).collect()
 }

@@ -13,7 +13,8 @@ use crate::error::Result;
 use crate::icp::engine::matching::Points;
 use crate::icp::engine::registration::{Engine, Track};
 use crate::kernel::RobustKernel;
-use crate::parts::{ErrorMetric, KernelSchedule, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
+use crate::parts::{ErrorMetric, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
+use crate::quality::Free;
 use crate::system::System;
 
 /// Points whose distance at the guess is looked at.
@@ -28,7 +29,7 @@ pub struct Levels {
     /// Largest distance of a pair at the end, metre. `None`: three times the spacing of the target; where that is zero,
     /// a fiftieth of its radius for a surface without gaps.
     pub last_limit_m: Option<f64>,
-    /// Source points that the levels before the last work with. Default 4000.
+    /// Source points that the levels before the last work with, and that tell how the score responds to the pose. Default 4000.
     pub points: usize,
     /// Iterations that a level before the last may take. Default 12.
     pub iterations: usize,
@@ -81,7 +82,7 @@ fn median_distance(engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f6
             return Err(InputError::NonFinite { what: "source points in the target frame", index: source }.into());
         }
         let (normal, limit_m) = (guess.rotation * scene.source_normals[source], f64::INFINITY);
-        let query = Query { source, moved: moved.coords, normal, pose: *guess, limit_m, remember: false };
+        let query = Query { source, moved: moved.coords, normal, limit_m, remember: false };
         let partner = engine.parts.matching.partner(&query);
         Ok(partner.found.then(|| (partner.point - query.moved).norm()))
     };
@@ -94,7 +95,7 @@ pub struct Alternative<'a> {
     /// The metric; `None`: that of the registration.
     pub metric: Option<Box<dyn ErrorMetric + 'a>>,
     /// The kernel.
-    pub kernel: Box<dyn KernelSchedule + 'a>,
+    pub kernel: RobustKernel,
     /// The rejections, in place of those of the registration.
     pub rejection: Vec<Box<dyn PairRejection + 'a>>,
 }
@@ -104,7 +105,7 @@ impl Alternative<'_> {
     pub fn usual(kernel: RobustKernel, max_normal_angle_rad: Option<f64>, trim: Option<f64>) -> Vec<Self> {
         let with = |kernel: RobustKernel, angle: Option<f64>| Self {
             metric: None,
-            kernel: Box::new(kernel),
+            kernel,
             rejection: rejections(angle, trim),
         };
         let mut alternatives = vec![with(kernel, None)];
@@ -148,7 +149,8 @@ impl<'p> Engine<'p> {
         let Some(starts) = self.parts.starts.filter(|_| self.parts.levels.first_limit_m.is_none()) else {
             return from_guess.map(|(_, track)| track);
         };
-        let share = from_guess.as_ref().map(|(_, track)| self.share_with_partner(selected, track, limits));
+        let share =
+            from_guess.as_ref().map(|(_, track)| self.share_with_partner(selected, track, limits[limits.len() - 1]));
         if share.is_ok_and(|share| share >= starts.convincing) {
             return from_guess.map(|(_, track)| track);
         }
@@ -177,27 +179,27 @@ impl<'p> Engine<'p> {
             starts.iter().flat_map(|start| alternatives.iter().map(move |engine| (start, engine))).collect();
         let run = |&(start, engine): &(&Isometry3<f64>, &Engine<'_>)| {
             let track = engine.down(sample, start, limits)?;
-            Ok((self.fit(sample, &track, limits)?, track))
+            Ok((self.fit(sample, &track, limits[limits.len() - 1])?, track))
         };
         ways.par_iter().map(run).collect()
     }
 
     fn with(&self, alternative: &'p Alternative<'p>) -> Engine<'p> {
         let metric = alternative.metric.as_deref().unwrap_or(self.metric);
-        Engine { metric, rejection: &alternative.rejection, kernel: &*alternative.kernel, ..*self }
+        Engine { metric, rejection: &alternative.rejection, kernel: alternative.kernel, ..*self }
     }
 
     fn down(&self, sample: &[usize], guess: &Isometry3<f64>, limits: &[f64]) -> Result<Track> {
-        let mut track = Track { pose: *guess, iterations: 0 };
+        let mut track = Track { pose: *guess, iterations: 0, free: Free::all() };
         let mut points = Points::new(sample.to_vec());
-        for level in 0..limits.len() {
-            for iteration in 0..self.parts.levels.iterations {
-                if track.iterations + 1 >= self.parts.stopping.max_iterations() {
+        for limit_m in limits {
+            for _ in 0..self.parts.levels.iterations {
+                if track.iterations + 1 >= self.parts.stopping.max_iterations {
                     return Ok(track);
                 }
-                let moment = track.moment(limits, level, iteration);
+                let moment = track.moment(*limit_m);
                 let step = self.step(&mut track, &moment, &mut points)?;
-                if motion_length(&step) < self.parts.levels.step_fraction * limits[level] {
+                if motion_length(&step) < self.parts.levels.step_fraction * limit_m {
                     break;
                 }
             }
@@ -206,23 +208,23 @@ impl<'p> Engine<'p> {
     }
 
     /// How well a sample fits at the end of a track: its number of pairs, each weighted by its residual.
-    fn fit(&self, sample: &[usize], track: &Track, limits: &[f64]) -> Result<f64> {
-        let moment = track.moment(limits, limits.len() - 1, 0);
+    fn fit(&self, sample: &[usize], track: &Track, limit_m: f64) -> Result<f64> {
+        let moment = track.moment(limit_m);
         let scene = self.scene.at(moment);
         let pairs = self.gated_pairs(&scene, &mut Points::new(sample.to_vec()))?;
-        let system = System::new(&scene, self.metric, &pairs, (RobustKernel::None, 1.0));
-        let unit = FIT_RESIDUAL * moment.limit_m;
+        let system = System::new(&scene, self.metric, &pairs, RobustKernel::None);
+        let unit = FIT_RESIDUAL * limit_m;
         Ok((0..pairs.len()).map(|i| 1.0 / (1.0 + (system.residual_length(i) / unit).powi(2))).sum())
     }
 
     /// Share of the points with a partner at the end of a track, normals or not.
-    fn share_with_partner(&self, selected: &[usize], track: &Track, limits: &[f64]) -> f64 {
+    fn share_with_partner(&self, selected: &[usize], track: &Track, limit_m: f64) -> f64 {
         let sample = thinned(selected, GUESS_SAMPLES);
-        let (pose, limit_m) = (track.pose, limits[limits.len() - 1]);
+        let pose = track.pose;
         let found = sample.par_iter().filter(|&&source| {
             let moved = pose * self.scene.source.points[source];
             let normal = pose.rotation * self.scene.source_normals[source];
-            let query = Query { source, moved: moved.coords, normal, pose, limit_m, remember: false };
+            let query = Query { source, moved: moved.coords, normal, limit_m, remember: false };
             is_usable(&moved) && self.parts.matching.partner(&query).found
         });
         found.count() as f64 / sample.len().max(1) as f64

@@ -18,8 +18,10 @@ const SETTLING: f64 = 0.1;
 /// Source points that are matched again and again.
 pub(crate) struct Points {
     pub indices: Vec<usize>,
-    /// The last answers, from the moment on at which the poses settle; empty before.
+    /// The last answers.
     memory: Vec<Memory>,
+    /// Whether answers are remembered: from the moment on at which the poses settle.
+    remembers: bool,
     last_pose: Option<Isometry3<f64>>,
 }
 
@@ -33,15 +35,13 @@ struct Memory {
 
 impl Points {
     pub(crate) fn new(indices: Vec<usize>) -> Self {
-        Self { indices, memory: Vec::new(), last_pose: None }
+        let nothing = Memory { partner: Partner::none(0.0), asked_at: Vector3::zeros(), limit_m: f64::NAN };
+        Self { memory: vec![nothing; indices.len()], indices, remembers: false, last_pose: None }
     }
 
     /// Remembers answers from now on: the poses to come are near each other.
     pub(crate) fn remember(&mut self) {
-        if self.memory.is_empty() {
-            let nothing = Memory { partner: Partner::none(0.0), asked_at: Vector3::zeros(), limit_m: f64::NAN };
-            self.memory = vec![nothing; self.indices.len()];
-        }
+        self.remembers = true;
     }
 
     /// Remembers answers once the poses have come near each other.
@@ -62,21 +62,16 @@ impl Engine<'_> {
     /// Pairs of the points in their order that every part keeps one by one.
     pub(crate) fn gated_pairs(&self, scene: &Scene<'_>, points: &mut Points) -> Result<Vec<Pair>> {
         points.remember_when_settling(scene);
-        let Points { indices, memory, .. } = points;
-        let chunks: Result<Vec<Vec<Pair>>> = if memory.is_empty() {
-            let pairs = |indices: &[usize]| {
-                let mut pairs = Vec::with_capacity(indices.len());
-                indices.iter().try_for_each(|&i| self.pair(scene, i, None, &mut pairs)).map(|()| pairs)
-            };
-            indices.par_chunks(CHUNK).map(pairs).collect()
-        } else {
-            let pairs = |(indices, memory): (&[usize], &mut [Memory])| {
-                let mut pairs = Vec::with_capacity(indices.len());
-                let mut asked = indices.iter().zip(memory);
-                asked.try_for_each(|(&i, memory)| self.pair(scene, i, Some(memory), &mut pairs)).map(|()| pairs)
-            };
-            indices.par_chunks(CHUNK).zip(memory.par_chunks_mut(CHUNK)).map(pairs).collect()
+        let Points { indices, memory, remembers, .. } = points;
+        let pairs = |(indices, memory): (&[usize], &mut [Memory])| {
+            let mut pairs = Vec::with_capacity(indices.len());
+            for (&i, memory) in indices.iter().zip(memory) {
+                self.pair(scene, i, remembers.then_some(memory), &mut pairs)?;
+            }
+            Ok(pairs)
         };
+        let chunks: Result<Vec<Vec<Pair>>> =
+            indices.par_chunks(CHUNK).zip(memory.par_chunks_mut(CHUNK)).map(pairs).collect();
         Ok(chunks?.concat())
     }
 
@@ -128,7 +123,7 @@ impl Engine<'_> {
         let moved = moved.coords;
         let turned = pose.rotation * scene.source_normals[source];
         let limit_m = scene.moment.limit_m;
-        let query = Query { source, moved, normal: turned, pose, limit_m, remember: memory.is_some() };
+        let query = Query { source, moved, normal: turned, limit_m, remember: memory.is_some() };
         let partner = self.ask(&query, memory);
         if !partner.found {
             return Ok(());

@@ -3,11 +3,10 @@
 use nalgebra::Matrix6;
 
 use crate::icp::engine::descent::rejections;
-use crate::icp::{Alternative, Levels, Registration, Starts};
+use crate::icp::{Alternative, Levels, Registration, Settled, Starts};
 use crate::kernel::RobustKernel;
 use crate::parts::{
-    AllPoints, EveryNth, GaussNewton, NormalSpace, PlaneToPlane, PointMatching, PointToPlane, PointToPoint,
-    RandomPoints, Settled, SigmaWeight, Stability, SymmetricPlanes,
+    GaussNewton, PlaneToPlane, PointMatching, PointToPlane, PointToPoint, Selection, SigmaWeight, SymmetricPlanes,
 };
 use crate::result::DegeneracyPolicy;
 use crate::voxels::VoxelAlignmentOptions;
@@ -31,29 +30,6 @@ pub enum Metric {
     SymmetricPlanes,
     /// Distance of small disks: generalised ICP `[Segal2009]`.
     PlaneToPlane,
-}
-
-/// Which source points take part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Selection {
-    /// All.
-    #[default]
-    All,
-    /// Every n-th in the order of the cloud.
-    EveryNth(usize),
-    /// About this many, spread evenly over the directions of the normals `[RusinkiewiczLevoy2001]`: what few points
-    /// say about a sliding direction is not drowned by a large wall.
-    NormalSpace(usize),
-    /// A random sample.
-    Random {
-        /// Number of points.
-        count: usize,
-        /// Seed: the same points for the same seed.
-        seed: u64,
-    },
-    /// About this many, chosen such that all six motions are held as evenly as the surface allows `[Gelfand2003]`.
-    Stability(usize),
 }
 
 /// Options of an ICP run. The defaults carry no scale: distances left at `None` come from the clouds.
@@ -147,13 +123,7 @@ impl IcpOptions {
         }
         let (max_iterations, step_tolerance_m) = (self.max_iterations, self.step_tolerance_m);
         Registration {
-            selection: match self.selection {
-                Selection::All => Box::new(AllPoints),
-                Selection::EveryNth(n) => Box::new(EveryNth(n)),
-                Selection::NormalSpace(count) => Box::new(NormalSpace(count)),
-                Selection::Random { count, seed } => Box::new(RandomPoints { count, seed }),
-                Selection::Stability(count) => Box::new(Stability(count)),
-            },
+            selection: Box::new(self.selection),
             matching: Box::new(matching),
             rejection: rejections(angle, trim),
             weighting: vec![Box::new(SigmaWeight)],
@@ -164,7 +134,7 @@ impl IcpOptions {
                 Metric::PlaneToPlane => Box::new(PlaneToPlane::default()),
             },
             minimisation: Box::new(GaussNewton),
-            kernel: Box::new(self.kernel),
+            kernel: self.kernel,
             levels: Levels {
                 first_limit_m: self.initial_correspondence_distance_m,
                 last_limit_m: self.max_correspondence_distance_m,
@@ -172,7 +142,7 @@ impl IcpOptions {
             },
             starts: Some(Starts::default()),
             alternatives,
-            stopping: Box::new(Settled { max_iterations, step_tolerance_m, ..Settled::default() }),
+            stopping: Settled { max_iterations, step_tolerance_m, ..Settled::default() },
             degeneracy: self.degeneracy,
             prior_covariance: self.prior_covariance,
             max_motion_sigma_m: self.max_motion_sigma_m,

@@ -9,12 +9,11 @@ use crate::icp::engine::registration::{Engine, Track};
 use crate::icp::engine::sensitivity::sensitivity;
 use crate::icp::prior::fused_with_prior;
 use crate::parts::{Moment, Scene, thinned};
-use crate::quality::Residuals;
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::system::System;
+use rigid_pose::Uncertain;
 
-/// Source points from which the response of the score and the overlap are taken.
-const RESPONSE_POINTS: usize = 4000;
+/// Source points from which the overlap is taken where not all are selected.
 const OVERLAP_POINTS: usize = 20_000;
 
 impl Engine<'_> {
@@ -23,11 +22,11 @@ impl Engine<'_> {
         &self,
         track: &Track,
         points: &mut Points,
-        limits: &[f64],
+        limit_m: f64,
         guess: &Isometry3<f64>,
         stop: StopReason,
     ) -> Result<IcpResult> {
-        let moment = Moment { ended: true, ..track.moment(limits, limits.len() - 1, 0) };
+        let moment = Moment { ended: true, ..track.moment(limit_m) };
         let scene = self.scene.at(moment);
         let gated = self.gated_pairs(&scene, points)?;
         let overlap = if points.indices.len() == scene.source.len() {
@@ -36,10 +35,10 @@ impl Engine<'_> {
             self.overlap(&scene)?
         };
         let pairs = self.enough(&scene, gated, points, track.iterations)?;
-        let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&moment));
-        let verdict = verdict(&system, self.max_motion_sigma_m(), Residuals::Settled)?;
-        let sample = thinned(&points.indices, RESPONSE_POINTS);
-        let step_m = (0.5 * system.rms_m()).max(0.01 * moment.limit_m);
+        let system = System::new(&scene, self.metric, &pairs, self.kernel);
+        let verdict = verdict(&system, self.max_motion_sigma_m())?;
+        let sample = thinned(&points.indices, self.parts.levels.points);
+        let step_m = (0.5 * system.rms_m()).max(0.01 * limit_m);
         let response = sensitivity(self, &system, &sample, step_m)?;
         let mut result = IcpResult {
             target_from_source: track.pose,
@@ -49,12 +48,12 @@ impl Engine<'_> {
             iterations: track.iterations,
             stop,
             correspondences: pairs.len(),
-            max_correspondence_distance_m: moment.limit_m,
+            max_correspondence_distance_m: limit_m,
             degenerate: verdict.undetermined(),
         };
         if let (DegeneracyPolicy::HoldAtPrior, Some(prior)) = (self.parts.degeneracy, &self.parts.prior_covariance) {
-            let information = verdict.information(&track.pose, &response);
-            (result.target_from_source, result.covariance) = fused_with_prior(&track.pose, &information, guess, prior)?;
+            let fused = fused_with_prior(&Uncertain { pose: track.pose, covariance: result.covariance }, guess, prior)?;
+            (result.target_from_source, result.covariance) = (fused.pose, fused.covariance);
         }
         Ok(result)
     }

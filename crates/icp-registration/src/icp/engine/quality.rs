@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use crate::error::Result;
 use crate::parts::Rows;
-use crate::quality::{Cells, Residuals, Verdict};
+use crate::quality::{Cells, Verdict};
 use crate::system::System;
 
 /// Cells across the rms radius where distances of points are minimised: how far samples lie beside each other along the surface beats with
@@ -12,7 +12,7 @@ use crate::system::System;
 const CELLS_OF_SAMPLES: f64 = 4.0;
 
 /// Judges the pairs of `system`; motions with a predicted sigma above `max_sigma_m` are undetermined.
-pub(in crate::icp) fn verdict(system: &System<'_>, max_sigma_m: f64, residuals: Residuals) -> Result<Verdict> {
+pub(in crate::icp) fn verdict(system: &System<'_>, max_sigma_m: f64) -> Result<Verdict> {
     let frame = system.frame();
     // On the way, a deviation that is rather too small keeps the iterations going.
     let at_the_end = system.scene().moment.ended;
@@ -25,7 +25,7 @@ pub(in crate::icp) fn verdict(system: &System<'_>, max_sigma_m: f64, residuals: 
         let slope = slope_along_normal(system, i, &mut buffers[0]);
         add_information(system, i, slope * twin_weight, &mut buffers, cells.add(&pair.moved, &score));
     }
-    Verdict::new(&cells, max_sigma_m, residuals)
+    Verdict::new(&cells, max_sigma_m)
 }
 
 /// Slope of a pair's influence along its normal. The kernel takes weight along the residual alone: the slope of its

@@ -7,12 +7,13 @@ use crate::icp::IcpOptions;
 use crate::icp::engine::descent::{Alternative, Levels};
 use crate::icp::engine::matching::Points;
 use crate::icp::engine::quality::verdict;
+use crate::icp::settled::Settled;
 use crate::icp::starts::Starts;
+use crate::kernel::RobustKernel;
 use crate::parts::{
-    ErrorMetric, KernelSchedule, Minimiser, Moment, NearestPoint, PairRejection, PairWeighting, PointMatching,
-    PointSelection, Progress, Scene, StoppingRule,
+    ErrorMetric, Minimiser, Moment, NearestPoint, PairRejection, PairWeighting, PointMatching, PointSelection, Scene,
 };
-use crate::quality::Residuals;
+use crate::quality::{Free, OPEN, Verdict};
 use crate::result::DegeneracyPolicy;
 use crate::result::{IcpResult, StopReason};
 use crate::system::System;
@@ -37,8 +38,8 @@ pub struct Registration<'a> {
     pub metric: Box<dyn ErrorMetric + 'a>,
     /// How it is minimised.
     pub minimisation: Box<dyn Minimiser + 'a>,
-    /// Robust kernel in the course of the run.
-    pub kernel: Box<dyn KernelSchedule + 'a>,
+    /// Robust kernel; its scale is the median absolute deviation of the residuals, anew in each iteration.
+    pub kernel: RobustKernel,
     /// Distance limits from coarse to fine.
     pub levels: Levels,
     /// More starts where the guess alone does not convince.
@@ -47,7 +48,7 @@ pub struct Registration<'a> {
     /// last level, and the pose at which most of a sample fits goes on.
     pub alternatives: Vec<Alternative<'a>>,
     /// When the last level ends.
-    pub stopping: Box<dyn StoppingRule + 'a>,
+    pub stopping: Settled,
     /// What happens to motions that the geometry does not determine.
     pub degeneracy: DegeneracyPolicy,
     /// Covariance of the guess in the tangent `[dt target axes, dtheta source axes]`, for
@@ -92,8 +93,17 @@ impl<'a> Registration<'a> {
         let limits = self.levels.limits(&engine, &selected, guess)?;
         let mut track = engine.descend(&selected, guess, &limits)?;
         let mut points = Points::new(selected);
-        let stop = engine.settle(&mut track, &mut points, &limits)?;
-        engine.result(&track, &mut points, &limits, guess, stop)
+        let last_limit_m = limits[limits.len() - 1];
+        let mut stop = engine.settle(&mut track, &mut points, last_limit_m)?;
+        if self.degeneracy != DegeneracyPolicy::Report {
+            let moment = Moment { ended: true, ..track.moment(last_limit_m) };
+            let verdict = engine.verdict(&moment, &mut points, track.iterations)?;
+            if let Some((pose, free)) = verdict.back_at(guess, &track.pose) {
+                (track.pose, track.free) = (pose, free);
+                stop = engine.settle(&mut track, &mut points, last_limit_m)?;
+            }
+        }
+        engine.result(&track, &mut points, last_limit_m, guess, stop)
     }
 }
 
@@ -104,7 +114,7 @@ pub(crate) struct Engine<'p> {
     pub scene: Scene<'p>,
     pub metric: &'p dyn ErrorMetric,
     pub rejection: &'p [Box<dyn PairRejection + 'p>],
-    pub kernel: &'p dyn KernelSchedule,
+    pub kernel: RobustKernel,
 }
 
 /// A pose on its way.
@@ -112,12 +122,13 @@ pub(crate) struct Engine<'p> {
 pub(crate) struct Track {
     pub pose: Isometry3<f64>,
     pub iterations: usize,
+    pub free: Free,
 }
 
 impl Track {
     /// Where the run is at this pose.
-    pub(crate) fn moment(&self, limits: &[f64], level: usize, iteration: usize) -> Moment {
-        Moment { pose: self.pose, limit_m: limits[level], level, levels: limits.len(), iteration, ended: false }
+    pub(crate) fn moment(&self, limit_m: f64) -> Moment {
+        Moment { pose: self.pose, limit_m, ended: false }
     }
 }
 
@@ -130,12 +141,12 @@ impl<'p> Engine<'p> {
     ) -> Result<Self> {
         require_pose("the guess", guess)?;
         let target = parts.matching.target();
-        let moment = Moment { pose: *guess, limit_m: f64::INFINITY, level: 0, levels: 1, iteration: 0, ended: false };
+        let moment = Moment { pose: *guess, limit_m: f64::INFINITY, ended: false };
         let with_normal = source_normals.iter().filter(|n| !n.x.is_nan()).count();
         let is_surface = 2 * with_normal >= source.len();
         let scene = Scene { source, source_normals, is_surface, target, moment };
         parts.validate(&scene)?;
-        Ok(Self { parts, scene, metric: &*parts.metric, rejection: &parts.rejection, kernel: &*parts.kernel })
+        Ok(Self { parts, scene, metric: &*parts.metric, rejection: &parts.rejection, kernel: parts.kernel })
     }
 
     /// The selected points, all of which exist.
@@ -148,21 +159,21 @@ impl<'p> Engine<'p> {
     }
 
     /// Iterates on all selected points at the last limit.
-    fn settle(&self, track: &mut Track, points: &mut Points, limits: &[f64]) -> Result<StopReason> {
+    fn settle(&self, track: &mut Track, points: &mut Points, limit_m: f64) -> Result<StopReason> {
+        let stopping = &self.parts.stopping;
+        let tolerance_m = stopping.step_tolerance_m.unwrap_or(1e-5 * self.scene.target.radius_m);
         let mut lengths = Vec::new();
-        while track.iterations < self.parts.stopping.max_iterations() {
-            let moment = track.moment(limits, limits.len() - 1, lengths.len());
-            let step = self.step(track, &moment, points)?;
+        while track.iterations < stopping.max_iterations {
+            let step = self.step(track, &track.moment(limit_m), points)?;
             lengths.push(motion_length(&step));
-            // While the kernel narrows, small steps mean nothing.
-            if self.kernel.at(&moment).1 > 1.0 {
-                continue;
+            if motion_length(&step) <= tolerance_m {
+                return Ok(StopReason::Converged);
             }
-            let radius_m = self.scene.target.radius_m;
-            let mut step_over_sigma = || self.step_over_sigma(track, limits, points, &step);
-            let mut progress = Progress { step_lengths_m: &lengths, radius_m, step_over_sigma: &mut step_over_sigma };
-            if let Some(reason) = self.parts.stopping.decide(&mut progress)? {
-                return Ok(reason);
+            if stopping.no_longer_shrink(&lengths) {
+                let verdict = self.verdict(&track.moment(limit_m), points, track.iterations)?;
+                if verdict.over_sigma(&step) <= stopping.noise_fraction {
+                    return Ok(StopReason::WithinNoise);
+                }
             }
         }
         Ok(StopReason::MaxIterations)
@@ -172,8 +183,8 @@ impl<'p> Engine<'p> {
     pub(crate) fn step(&self, track: &mut Track, moment: &Moment, points: &mut Points) -> Result<Vector6<f64>> {
         let pairs = self.pairs(moment, points, track.iterations)?;
         let scene = self.scene.at(*moment);
-        let system = System::new(&scene, self.metric, &pairs, self.kernel.at(moment));
-        let mut step = self.parts.minimisation.step(&system, &self.held(&system)?)?;
+        let system = System::new(&scene, self.metric, &pairs, self.kernel).in_frame(track.free.frame);
+        let mut step = self.parts.minimisation.step(&system, &track.free.projection)?;
         // Pairs at most `limit` apart give no reason to move farther than a few times that.
         let excess = motion_length(&step) / (2.0 * moment.limit_m);
         if excess > 1.0 {
@@ -187,25 +198,14 @@ impl<'p> Engine<'p> {
         Ok(step)
     }
 
-    /// Motions that are not to be taken.
-    fn held(&self, system: &System<'_>) -> Result<Vec<Vector6<f64>>> {
-        match self.parts.degeneracy {
-            DegeneracyPolicy::Report => Ok(Vec::new()),
-            DegeneracyPolicy::HoldAtGuess | DegeneracyPolicy::HoldAtPrior => {
-                Ok(verdict(system, self.max_motion_sigma_m(), Residuals::Misaligned)?.held())
-            }
-        }
-    }
-
-    fn step_over_sigma(&self, track: &Track, limits: &[f64], points: &mut Points, step: &Vector6<f64>) -> Result<f64> {
-        let moment = track.moment(limits, limits.len() - 1, 0);
-        let pairs = self.pairs(&moment, points, track.iterations)?;
-        let scene = self.scene.at(moment);
-        let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&Moment { ended: true, ..moment }));
-        Ok(verdict(&system, self.max_motion_sigma_m(), Residuals::Settled)?.over_sigma(step))
+    /// What the pairs of a moment say about its pose.
+    fn verdict(&self, moment: &Moment, points: &mut Points, iterations: usize) -> Result<Verdict> {
+        let pairs = self.pairs(moment, points, iterations)?;
+        let scene = self.scene.at(*moment);
+        verdict(&System::new(&scene, self.metric, &pairs, self.kernel), self.max_motion_sigma_m())
     }
 
     pub(crate) fn max_motion_sigma_m(&self) -> f64 {
-        self.parts.max_motion_sigma_m.unwrap_or(self.scene.target.radius_m / 300.0)
+        self.parts.max_motion_sigma_m.unwrap_or(OPEN * self.scene.target.radius_m)
     }
 }

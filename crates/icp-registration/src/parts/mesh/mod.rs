@@ -82,23 +82,13 @@ impl TriangleMesh {
     }
 }
 
-/// Root mean square distance from the centroid, each triangle at its middle with its area.
+/// Root mean square distance from the centroid, each corner with a third of the area of its triangle: corners, unlike middles,
+/// tell the size of a mesh of few triangles.
 fn radius(vertices: &[Point3<f64>], triangles: &[[u32; 3]], areas: &[f64]) -> f64 {
-    let total: f64 = areas.iter().sum();
-    let middle = |t: &[u32; 3]| t.iter().fold(Vector3::zeros(), |sum, &v| sum + vertices[v as usize].coords / 3.0);
-    let weighted = || triangles.iter().map(middle).zip(areas.iter().map(|a| a / total));
-    let centre = weighted().fold(Vector3::zeros(), |sum, (p, w)| sum + p * w);
-    // Corners, unlike middles, tell the size of a mesh of few triangles.
-    let square = |t: &[u32; 3]| t.iter().map(|&v| (vertices[v as usize].coords - centre).norm_squared() / 3.0).sum();
-    let squares: f64 = triangles
-        .iter()
-        .zip(areas)
-        .map(|(t, a)| -> f64 {
-            let s: f64 = square(t);
-            s * a / total
-        })
-        .sum();
-    squares.sqrt()
+    let total = 3.0 * areas.iter().sum::<f64>();
+    let corners = || triangles.iter().zip(areas).flat_map(|(t, area)| t.map(|v| (vertices[v as usize], area / total)));
+    let centre = corners().fold(Point3::origin(), |sum, (corner, share)| sum + corner.coords * share);
+    corners().map(|(corner, share)| (corner - centre).norm_squared() * share).sum::<f64>().sqrt()
 }
 
 /// The closest point on a triangle mesh, with the normal of its triangle: free of noise, so that it is trusted as exact.

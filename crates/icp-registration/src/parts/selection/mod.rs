@@ -3,10 +3,9 @@
 mod normal_space;
 mod stability;
 
-pub use normal_space::NormalSpace;
-pub use stability::Stability;
-
+use normal_space::normal_space;
 use rigid_pose::require_count;
+use stability::stability;
 
 use super::scene::Scene;
 use crate::error::Result;
@@ -17,54 +16,35 @@ pub trait PointSelection: Sync {
     fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>>;
 }
 
-/// All points `[BeslMcKay1992]`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct AllPoints;
+/// Which source points take part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Selection {
+    /// All `[BeslMcKay1992]`.
+    #[default]
+    All,
+    /// Every n-th in the order of the cloud `[TurkLevoy1994]`.
+    EveryNth(usize),
+    /// About this many, spread evenly over the directions of the normals `[RusinkiewiczLevoy2001]`: what few points
+    /// say about a sliding direction is not drowned by a large wall. Points without a normal are left out.
+    NormalSpace(usize),
+    /// About this many, chosen such that all six motions are held as evenly as the surface allows `[Gelfand2003]`: the next
+    /// point is always one that holds the motion held least so far. Points without a normal are left out.
+    Stability(usize),
+}
 
-impl PointSelection for AllPoints {
+impl PointSelection for Selection {
     fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
-        Ok((0..scene.source.len()).collect())
+        if let Self::EveryNth(number) | Self::NormalSpace(number) | Self::Stability(number) = *self {
+            require_count("selection", number, 1)?;
+        }
+        match *self {
+            Self::All => Ok((0..scene.source.len()).collect()),
+            Self::EveryNth(n) => Ok((0..scene.source.len()).step_by(n).collect()),
+            Self::NormalSpace(count) => Ok(normal_space(scene.source_normals, count)),
+            Self::Stability(count) => stability(scene, count),
+        }
     }
-}
-
-/// Every n-th point in the order of the cloud `[TurkLevoy1994]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct EveryNth(pub usize);
-
-impl PointSelection for EveryNth {
-    fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
-        require_count("selection", self.0, 1)?;
-        Ok((0..scene.source.len()).step_by(self.0).collect())
-    }
-}
-
-/// A random sample without repetition `[Masuda1996]`, the same for the same seed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RandomPoints {
-    /// Number of points; all where the cloud has fewer.
-    pub count: usize,
-    /// Seed of the generator.
-    pub seed: u64,
-}
-
-impl PointSelection for RandomPoints {
-    fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
-        require_count("count", self.count, 1)?;
-        let mut drawn: Vec<(u64, usize)> =
-            (0..scene.source.len()).map(|i| (scrambled(self.seed, i as u64), i)).collect();
-        drawn.sort_unstable();
-        let mut chosen: Vec<usize> = drawn.into_iter().take(self.count).map(|(_, i)| i).collect();
-        chosen.sort_unstable();
-        Ok(chosen)
-    }
-}
-
-/// A number without pattern for each index (the finaliser of `SplitMix64` `[Steele2014]`).
-fn scrambled(seed: u64, index: u64) -> u64 {
-    let mut z = seed.wrapping_add((index.wrapping_add(1)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// Every k-th of the selected such that about `wanted` remain.

@@ -1,26 +1,9 @@
 //! Selection evenly over the directions of the normals.
 
 use nalgebra::Vector3;
-use rigid_pose::require_count;
-
-use super::PointSelection;
-use crate::error::Result;
-use crate::parts::scene::Scene;
-
-/// About this many points, spread evenly over the directions of their normals `[RusinkiewiczLevoy2001]`: what few points
-/// say about a sliding direction is not drowned by a large wall. Points without a normal are left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NormalSpace(pub usize);
-
-impl PointSelection for NormalSpace {
-    fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
-        require_count("selection", self.0, 1)?;
-        Ok(normal_space(scene.source_normals, self.0))
-    }
-}
 
 /// Fills every direction's quota: small buckets give all they have, large ones every k-th point.
-fn normal_space(normals: &[Vector3<f64>], wanted: usize) -> Vec<usize> {
+pub(super) fn normal_space(normals: &[Vector3<f64>], wanted: usize) -> Vec<usize> {
     let mut buckets = vec![Vec::new(); BUCKETS];
     for (i, normal) in normals.iter().enumerate() {
         if let Some(bucket) = bucket(normal) {

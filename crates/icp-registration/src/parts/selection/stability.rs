@@ -2,41 +2,30 @@
 
 use nalgebra::{Matrix6, Vector3};
 
-use super::PointSelection;
 use crate::error::Result;
 use crate::parts::scene::Scene;
 use crate::quality::ROUNDING;
-use rigid_pose::{Centred, eigen6, require_count, symmetrised};
+use rigid_pose::{Centred, eigen6, symmetrised};
 
-/// About this many points, chosen such that all six motions are held as evenly as the surface allows
-/// `[Gelfand2003]`: the next point is always one that holds the motion held least so far. Points without a normal are
-/// left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stability(pub usize);
-
-impl PointSelection for Stability {
-    fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
-        require_count("selection", self.0, 1)?;
-        let points: Vec<(usize, Vector3<f64>, Vector3<f64>)> = (0..scene.source.len())
-            .map(|i| (i, scene.source.points[i].coords, scene.source_normals[i]))
-            .filter(|(_, _, normal)| !normal.x.is_nan())
-            .collect();
-        if points.len() <= self.0 {
-            return Ok(points.into_iter().map(|(i, _, _)| i).collect());
-        }
-        let holds = holds(&points)?;
-        let mut chosen: Vec<usize> = greedy(&holds, self.0).into_iter().map(|k| points[k].0).collect();
-        chosen.sort_unstable();
-        Ok(chosen)
+/// The points, about `wanted` of those with a normal, that hold all six motions as evenly as the surface allows `[Gelfand2003]`.
+pub(super) fn stability(scene: &Scene<'_>, wanted: usize) -> Result<Vec<usize>> {
+    let points: Vec<(usize, Vector3<f64>, Vector3<f64>)> = (0..scene.source.len())
+        .map(|i| (i, scene.source.points[i].coords, scene.source_normals[i]))
+        .filter(|(_, _, normal)| !normal.x.is_nan())
+        .collect();
+    if points.len() <= wanted {
+        return Ok(points.into_iter().map(|(i, _, _)| i).collect());
     }
+    let holds = holds(&points)?;
+    let mut chosen: Vec<usize> = greedy(&holds, wanted).into_iter().map(|k| points[k].0).collect();
+    chosen.sort_unstable();
+    Ok(chosen)
 }
 
 /// How much each point holds each eigen-motion of all points together: squares of `J · v`.
 fn holds(points: &[(usize, Vector3<f64>, Vector3<f64>)]) -> Result<Vec<[f64; 6]>> {
     let n = points.len() as f64;
-    let centre = points.iter().fold(Vector3::zeros(), |sum, (_, p, _)| sum + p / n);
-    let radius = (points.iter().map(|(_, p, _)| (p - centre).norm_squared() / n).sum::<f64>()).sqrt();
-    let frame = Centred { centre, radius_m: radius.max(f64::MIN_POSITIVE.sqrt()) };
+    let frame = Centred::about(points.iter().map(|(_, p, _)| *p), f64::MIN_POSITIVE.sqrt());
     let mut information = Matrix6::zeros();
     for (_, p, normal) in points {
         let j = frame.derivative(p, normal);

@@ -1,9 +1,16 @@
-//! Weight from the standard deviations that come with the points.
+//! How much a pair counts.
 
 use statistics::upper_median;
 
-use super::PairWeighting;
-use crate::parts::scene::{Pair, Scene};
+use super::scene::{Pair, Scene};
+
+/// Gives weights to pairs. Several multiply; a pair of weight zero is left out.
+///
+/// Weights are relative precisions: the robust kernel judges the residual times the root of the weight.
+pub trait PairWeighting: Sync {
+    /// Multiplies the weight of each pair.
+    fn weigh(&self, scene: &Scene<'_>, pairs: &mut [Pair]);
+}
 
 /// `1 / (σ²_source + σ²_target)` from the sigmas of the clouds; where none is known for a pair, the median of the
 /// others. No effect where neither cloud has sigmas.

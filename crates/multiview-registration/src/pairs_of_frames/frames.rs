@@ -314,8 +314,10 @@ impl<'a> Survey<'a> {
         let (used, wrong): (Vec<_>, Vec<_>) = sound.iter().zip(&graph.fits).partition(|(_, fits)| **fits);
         let placed = |pair: &PairAlignment| [pair.target, pair.source].iter().all(|k| graph.index(*k).is_some());
         let wrong = wrong.iter().map(|(pair, _)| &pair.alignment).filter(|pair| placed(pair));
-        let contradicting = wrong.map(crate::agreement::loops::contradicting);
-        self.refused.extend(contradicting);
+        self.refused.extend(wrong.map(|&PairAlignment { target, source, .. }| {
+            let reason = "contradicts the loops that the other pairs close".to_owned();
+            RefusedPair { target, source, reason }
+        }));
         let lost = |frame: &usize| graph.index(*frame).is_none() && !self.is_out(*frame);
         let lost: Vec<UnplacedFrame> =
             (0..self.count()).filter(lost).map(|frame| UnplacedFrame { frame, reason: self.why(frame) }).collect();

@@ -31,6 +31,13 @@ pub(crate) struct Keyframe {
     pub(crate) features: Option<Arc<FeatureCloud>>,
 }
 
+impl Keyframe {
+    /// Its features, or the cloud that they are made from.
+    pub(crate) fn features(&self) -> (Option<Arc<FeatureCloud>>, Option<Cloud>) {
+        (self.features.clone(), self.features.is_none().then(|| self.frame.to_cloud()))
+    }
+}
+
 /// Where a keyframe number leads to.
 #[derive(Debug, Clone, Copy)]
 enum Anchor {

@@ -16,8 +16,6 @@ use crate::survey::registration::Start;
 use projective_registration::{Agreement, FrameAlignmentOptions, OrganisedFrame, SharedError};
 use rigid_pose::InputError;
 
-/// Share of a frame that another must be expected to see for the two to be aligned.
-const LEAST_OVERLAP: f64 = 0.3;
 /// Pairs of a frame that are tried, those with the most overlap.
 const PARTNERS: usize = 6;
 /// Frames after each that it is tried with where the order is known.
@@ -234,7 +232,7 @@ impl<'a> Survey<'a> {
             for source in target + 1..self.count() {
                 let Some(pose) = pose(target, source) else { continue };
                 let overlap = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4);
-                if overlap >= LEAST_OVERLAP {
+                if overlap >= Agreement::LEAST_OVERLAP {
                     found.push((overlap, Candidate { target, source, guess: Guess::Near(pose) }));
                 }
             }

@@ -6,7 +6,6 @@ mod preintegrated;
 mod propagation;
 mod residual;
 mod rest;
-mod rotation;
 mod sample;
 #[cfg(feature = "sequence")]
 mod sequence;

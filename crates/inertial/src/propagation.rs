@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::noise::{Biases, ImuNoise};
 use crate::preintegrated::{Matrix9, Matrix9x6, POSITION, ROTATION, VELOCITY};
-use crate::rotation::right_jacobian;
 use crate::sample::InertialSample;
+use rigid_pose::left_jacobian;
 
 /// Motion in the axes that the body had at the start, free of gravity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +47,7 @@ pub(crate) fn step(
     let (a0, a1) = (r0 * before, r1 * after);
 
     let back = turn.inverse().to_rotation_matrix().into_inner();
-    let by_gyro = -right_jacobian(&theta) * dt;
+    let by_gyro = -left_jacobian(&theta).transpose() * dt;
     // R exp(φ) f = R f − R [f]x φ; at the end φ has turned with the body, and the bias of the rates has worked.
     let (c0, c1) = (-r0 * before.cross_matrix(), -r1 * after.cross_matrix());
     // Weights of both ends in the velocity, and in the position.

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, Translation3, Vector3};
 
 use crate::noise::Biases;
 use crate::preintegrated::{Matrix9x6, POSITION, Preintegrated, ROTATION, VELOCITY};
-use crate::rotation::{right_jacobian, right_jacobian_inverse};
+use rigid_pose::{inverse_left_jacobian, left_jacobian};
 
 /// Rotation, velocity and position, three components each.
 pub type Vector9 = SVector<f64, 9>;
@@ -86,7 +86,7 @@ impl Preintegrated {
         residual.fixed_rows_mut::<3>(VELOCITY).copy_from(&(faster - motion.velocity));
         residual.fixed_rows_mut::<3>(POSITION).copy_from(&(moved - motion.position));
 
-        let inverse = right_jacobian_inverse(&turn);
+        let inverse = inverse_left_jacobian(&turn).transpose();
         let r_back = back.to_rotation_matrix().into_inner();
         let r_between: Matrix3<f64> = (second.rotation.inverse() * first.rotation).to_rotation_matrix().into_inner();
         let mut jacobians = ResidualJacobians {
@@ -116,7 +116,7 @@ impl Preintegrated {
         let effect =
             (self.by_biases * (biases.to_vector() - self.biases.to_vector())).fixed_rows::<3>(ROTATION).into_owned();
         let undone = nalgebra::UnitQuaternion::from_scaled_axis(-turn).to_rotation_matrix().into_inner();
-        let by_rotation = -inverse * undone * right_jacobian(&effect);
+        let by_rotation = -inverse * undone * left_jacobian(&effect).transpose();
         jacobians.biases = -self.by_biases;
         let turned = by_rotation * self.by_biases.fixed_rows::<3>(ROTATION);
         jacobians.biases.fixed_rows_mut::<3>(ROTATION).copy_from(&turned);

@@ -1,9 +1,9 @@
 //! The relative pose of two stations as an observation.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use crate::error::Result;
-use rigid_pose::{InputError, is_finite, pose_difference, relative_jacobians, require_length};
+use rigid_pose::{InputError, inverse_left_jacobian, is_finite, pose_difference, relative_jacobians, require_length};
 
 /// The residual of a relative pose, and the Jacobians of the model by target and source.
 pub(super) fn relative_pose_parts(
@@ -21,19 +21,6 @@ pub(super) fn relative_pose_parts(
         by
     });
     (v, by)
-}
-
-/// `J⁻¹` with `log(exp(-d) exp(v)) = v - J⁻¹(v) d` to first order in d.
-fn inverse_left_jacobian(v: &Vector3<f64>) -> Matrix3<f64> {
-    let angle = v.norm();
-    let cross = v.cross_matrix();
-    // The factor tends to 1/12; below a hundredth of a radian its next term, angle² / 720, is under 1e-6 of it.
-    let factor = if angle < 1e-2 {
-        1.0 / 12.0 + angle * angle / 720.0
-    } else {
-        1.0 / (angle * angle) - (1.0 + angle.cos()) / (2.0 * angle * angle.sin())
-    };
-    Matrix3::identity() - 0.5 * cross + factor * cross * cross
 }
 
 /// Refuses other than one finite pose for each of some stations, or frames.

@@ -19,8 +19,6 @@ use rigid_pose::InputError;
 /// By how much surfaces may stand apart at start poses, share of the depth: poses that err by 5 cm and 2 degrees an axis move them by some
 /// 0.05 against each other at 2 m. Larger ones only try more pairs.
 const START_ERROR: f32 = 0.15;
-/// Share of a frame that another must be expected to see at start poses: their errors hide half of what two frames share.
-const START_OVERLAP: f64 = 0.15;
 /// Pairs of a frame that are tried, those with the most overlap.
 const PARTNERS: usize = 6;
 /// Frames after each that it is tried with where the order is known.
@@ -210,8 +208,11 @@ impl<'a> Survey<'a> {
     /// Pairs that the start tells.
     fn first(&self) -> Vec<Candidate> {
         match self.start {
-            Start::Poses(poses) => self
-                .overlapping((START_ERROR, START_OVERLAP), Guess::Around, |a, b| Some(poses[a].inverse() * poses[b])),
+            Start::Poses(poses) => {
+                // Their errors hide half of what two frames share.
+                let limits = (START_ERROR, 0.5 * Agreement::LEAST_OVERLAP);
+                self.overlapping(limits, Guess::Around, |a, b| Some(poses[a].inverse() * poses[b]))
+            }
             _ => (0..self.count())
                 .flat_map(|target| (1..=FOLLOWING).map(move |step| (target, target + step)))
                 .filter(|(_, source)| *source < self.count())

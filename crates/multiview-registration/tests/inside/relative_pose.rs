@@ -1,6 +1,7 @@
 //! Derivatives of relative poses.
 
 use super::*;
+use nalgebra::Vector3;
 use rigid_pose::step_pose;
 
 #[test]

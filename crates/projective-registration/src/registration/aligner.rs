@@ -12,11 +12,10 @@ use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::quality::{Cell, Verdict};
 use crate::shared_error::Sighting;
+use icp_registration::quality::OPEN;
 use icp_registration::{IcpResult, StopReason, TUKEY};
 use rigid_pose::{Centred, InputError, require_pose, symmetrised};
 
-/// Of the biweight.
-pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
 /// Fewest pairs, and nodes of a frame, that a pose is told by: three an unknown and two more. Frames that overlap have hundreds.
 pub(crate) const FEWEST_PAIRS: usize = 20;
 /// Residuals from which scales are taken.
@@ -81,7 +80,7 @@ impl FrameAligner {
                 return Err(InputError::TooFewPoints { what, found: frame.len(), needed: FEWEST_PAIRS }.into());
             }
         }
-        let rules = Rules { extra_variance: 0.0, reach: BIWEIGHT };
+        let rules = Rules { extra_variance: 0.0, reach: TUKEY as f32 };
         let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
         let first = self.follow_levels(track.clone(), frames);
@@ -136,7 +135,7 @@ impl FrameAligner {
                 break;
             }
             let wide = track.iterations < WIDE_ITERATIONS;
-            track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
+            track.rules.reach = if wide { 3.0 * TUKEY as f32 } else { TUKEY as f32 };
             let (step, frame) = self.step(track, frames, blocks, 1e-4)?;
             if !wide {
                 self.narrow(track, frames, blocks);
@@ -180,7 +179,7 @@ impl FrameAligner {
     /// What the pairs of some nodes say about the pose.
     pub(crate) fn verdict(&mut self, track: &Track, frames: Frames<'_>, blocks: &[Block]) -> Result<Verdict> {
         let (moved, frame) = frames.moved(track);
-        let limit_m = self.options.max_motion_sigma_m.unwrap_or(FrameAlignmentOptions::OPEN * frame.radius_m);
+        let limit_m = self.options.max_motion_sigma_m.unwrap_or(OPEN * frame.radius_m);
         Verdict::new(&moved, blocks, limit_m, &mut self.cells)
     }
 

@@ -7,8 +7,8 @@ use crate::error::Result;
 use crate::partners::sums::median_residual;
 use crate::partners::track::{Frames, Track, is_within_noise};
 use crate::preparation::blocks::Block;
-use crate::registration::aligner::{BIWEIGHT, FrameAligner, SAMPLE};
-use icp_registration::StopReason;
+use crate::registration::aligner::{FrameAligner, SAMPLE};
+use icp_registration::{StopReason, TUKEY};
 
 /// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
 /// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
@@ -86,12 +86,12 @@ impl FrameAligner {
     /// Sets the reach of the kernel from the residuals.
     fn rescale(&mut self, track: &mut Track, frames: Frames<'_>, first: bool) {
         if first {
-            track.rules.reach = 10.0 * BIWEIGHT;
+            track.rules.reach = 10.0 * TUKEY as f32;
         }
         let (moved, _) = frames.moved(track);
         let blocks = frames.all_blocks();
         let median = median_residual(&moved, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
         let scale = (SIGMA_OF_MAD * median).max(0.1) as f32;
-        track.rules.reach = BIWEIGHT * scale;
+        track.rules.reach = TUKEY as f32 * scale;
     }
 }

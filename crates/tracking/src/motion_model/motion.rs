@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use rigid_pose::Uncertain;
+use rigid_pose::{Uncertain, inverse_left_jacobian, left_jacobian};
 
 /// What is known of the motion from the frame before to this one, for instance from an inertial unit: all of it, or the rotation
 /// alone ([`Self::of_turn`]).
@@ -68,21 +68,8 @@ pub(crate) fn exponential(screw: &Vector6<f64>) -> Isometry3<f64> {
 /// The screw of a motion.
 pub(crate) fn logarithm(motion: &Isometry3<f64>) -> Vector6<f64> {
     let (turn, shift) = (motion.rotation.scaled_axis(), motion.translation.vector);
-    let straight = left_jacobian(&turn).try_inverse().map_or(shift, |v| v * shift);
+    let straight = inverse_left_jacobian(&turn) * shift;
     Vector6::new(straight.x, straight.y, straight.z, turn.x, turn.y, turn.z)
-}
-
-/// `V(θ)`: the translation that a unit of straight motion becomes under a turn by θ.
-fn left_jacobian(turn: &Vector3<f64>) -> Matrix3<f64> {
-    let angle = turn.norm();
-    let cross = turn.cross_matrix();
-    // Below a thousandth of a radian the next terms are under 1e-8.
-    let (first, second) = if angle < 1e-3 {
-        (0.5, 1.0 / 6.0)
-    } else {
-        ((1.0 - angle.cos()) / angle.powi(2), (angle - angle.sin()) / angle.powi(3))
-    };
-    Matrix3::identity() + cross * first + cross * cross * second
 }
 
 #[cfg(test)]

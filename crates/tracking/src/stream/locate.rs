@@ -8,8 +8,9 @@ use crate::motion_model::velocity::Velocity;
 use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
 use pose_graph::{Relation, is_likely};
+use projective_registration::icp_registration::quality::OPEN;
 use projective_registration::{
-    Agreement, ByField, Error as FrameError, Field, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame,
+    Agreement, ByField, Error as FrameError, Field, FrameAligner, Influence, OrganisedFrame,
 };
 use rigid_pose::{InputError, Uncertain, step_pose, symmetrised};
 
@@ -50,7 +51,7 @@ pub(crate) struct Measured {
 impl Measured {
     /// Whether the geometry determines all motions well, and nothing speaks against the pose.
     fn is_firm(&self, radius_m: f64) -> bool {
-        self.is_sound() && self.pose.sigma_at(radius_m) <= FrameAlignmentOptions::OPEN * radius_m
+        self.is_sound() && self.pose.sigma_at(radius_m) <= OPEN * radius_m
     }
 
     /// Whether the frames agree at the pose as they do at right ones. Frames that have slid along a wall fit as well, and
@@ -71,9 +72,7 @@ impl Measured {
         let scale = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, radius_m, radius_m, radius_m));
         let back = Matrix6::from_diagonal(&scale.diagonal().map(|s| 1.0 / s));
         let mut motions = symmetrised(&(scale * self.pose.covariance * scale)).symmetric_eigen();
-        for variance in
-            motions.eigenvalues.iter_mut().filter(|v| **v > (FrameAlignmentOptions::OPEN * radius_m).powi(2))
-        {
+        for variance in motions.eigenvalues.iter_mut().filter(|v| **v > (OPEN * radius_m).powi(2)) {
             *variance = variance.max(radius_m * radius_m);
         }
         let covariance = symmetrised(&(back * motions.recompose() * back));

@@ -16,9 +16,13 @@ use crate::survey::registration::Start;
 use projective_registration::{Agreement, FrameAlignmentOptions, OrganisedFrame, SharedError};
 use rigid_pose::InputError;
 
+/// Share of a frame that another must be expected to see for the two to be aligned.
+const LEAST_OVERLAP: f64 = 0.3;
 /// By how much surfaces may stand apart at start poses, share of the depth: poses that err by 5 cm and 2 degrees an axis move them by some
 /// 0.05 against each other at 2 m. Larger ones only try more pairs.
 const START_ERROR: f32 = 0.15;
+/// As [`LEAST_OVERLAP`], at start poses: their errors hide up to half of what two frames share.
+const START_OVERLAP: f64 = 0.15;
 /// Pairs of a frame that are tried, those with the most overlap.
 const PARTNERS: usize = 6;
 /// Frames after each that it is tried with where the order is known.
@@ -208,11 +212,8 @@ impl<'a> Survey<'a> {
     /// Pairs that the start tells.
     fn first(&self) -> Vec<Candidate> {
         match self.start {
-            Start::Poses(poses) => {
-                // Their errors hide half of what two frames share.
-                let limits = (START_ERROR, 0.5 * Agreement::LEAST_OVERLAP);
-                self.overlapping(limits, Guess::Around, |a, b| Some(poses[a].inverse() * poses[b]))
-            }
+            Start::Poses(poses) => self
+                .overlapping((START_ERROR, START_OVERLAP), Guess::Around, |a, b| Some(poses[a].inverse() * poses[b])),
             _ => (0..self.count())
                 .flat_map(|target| (1..=FOLLOWING).map(move |step| (target, target + step)))
                 .filter(|(_, source)| *source < self.count())
@@ -228,7 +229,7 @@ impl<'a> Survey<'a> {
             let tried = self.tried.contains(&(a, b)) || self.pairs.iter().any(|pair| pair.joins(a, b));
             (!tried).then_some(pose)
         };
-        self.overlapping((Agreement::LARGEST_ERROR, Agreement::LEAST_OVERLAP), Guess::Near, open)
+        self.overlapping((Agreement::LARGEST_ERROR, LEAST_OVERLAP), Guess::Near, open)
     }
 
     /// For each frame the pairs with the most overlap, at poses `a_from_b`, where surfaces lie within an error, a part of the depth, on
@@ -325,10 +326,8 @@ impl<'a> Survey<'a> {
         let (used, wrong): (Vec<_>, Vec<_>) = sound.iter().zip(&graph.fits).partition(|(_, fits)| **fits);
         let placed = |pair: &PairAlignment| [pair.target, pair.source].iter().all(|k| graph.index(*k).is_some());
         let wrong = wrong.iter().map(|(pair, _)| &pair.alignment).filter(|pair| placed(pair));
-        self.refused.extend(wrong.map(|&PairAlignment { target, source, .. }| {
-            let reason = "contradicts the loops that the other pairs close".to_owned();
-            RefusedPair { target, source, reason }
-        }));
+        let contradicting = wrong.map(crate::agreement::loops::contradicting);
+        self.refused.extend(contradicting);
         let lost = |frame: &usize| graph.index(*frame).is_none() && !self.is_out(*frame);
         let lost: Vec<UnplacedFrame> =
             (0..self.count()).filter(lost).map(|frame| UnplacedFrame { frame, reason: self.why(frame) }).collect();

@@ -8,3 +8,4 @@ pub(crate) mod places;
 pub(crate) mod quality;
 pub(crate) mod search;
 pub(crate) mod settling;
+pub(crate) mod starts;

@@ -7,14 +7,12 @@ use crate::error::Result;
 use crate::partners::sums::median_residual;
 use crate::partners::track::{Frames, Track, is_within_noise};
 use crate::preparation::blocks::Block;
-use crate::registration::aligner::{FrameAligner, SAMPLE};
-use icp_registration::{StopReason, TUKEY};
+use crate::registration::aligner::{BIWEIGHT, FrameAligner, SAMPLE};
+use icp_registration::StopReason;
 
 /// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
 /// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
 const COARSE_FRACTION: f64 = 1.0;
-/// Length of a step, in units of the radius, at which the pose stands: far below every noise.
-const SMALL_STEP: f64 = 1e-5;
 /// Steps before which the reach of the kernel is set.
 const NARROWINGS: usize = 3;
 /// Steps after which it is first seen whether the pose has got anywhere, and then after twice as many as before: where nodes
@@ -52,7 +50,7 @@ impl FrameAligner {
             if *narrowings > 0 {
                 continue;
             }
-            let tolerance = SMALL_STEP * frame.radius_m;
+            let tolerance = self.options.step_tolerance_m.unwrap_or(1e-5 * frame.radius_m);
             if step <= tolerance || track.over_sigma <= over_sigma {
                 return Ok(StopReason::Converged);
             }
@@ -86,12 +84,12 @@ impl FrameAligner {
     /// Sets the reach of the kernel from the residuals.
     fn rescale(&mut self, track: &mut Track, frames: Frames<'_>, first: bool) {
         if first {
-            track.rules.reach = 10.0 * TUKEY as f32;
+            track.rules.reach = 10.0 * BIWEIGHT;
         }
         let (moved, _) = frames.moved(track);
         let blocks = frames.all_blocks();
         let median = median_residual(&moved, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
         let scale = (SIGMA_OF_MAD * median).max(0.1) as f32;
-        track.rules.reach = TUKEY as f32 * scale;
+        track.rules.reach = BIWEIGHT * scale;
     }
 }

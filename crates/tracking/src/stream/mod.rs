@@ -6,4 +6,5 @@ pub(crate) mod locate;
 pub(crate) mod reference;
 pub(crate) mod returns;
 pub(crate) mod tracker;
+pub(crate) mod unguessed;
 pub(crate) mod wide;

@@ -117,7 +117,7 @@ impl Task<'_> {
             .with_min_len(64)
             .map(|place| {
                 let rows = common::rows(place, &observations.all, errors, common)?;
-                Ok((common::mean(place, &rows), Squares::new(place, &rows, common)?))
+                Ok((common::mean(place, &rows), Squares::new(place, &rows, common)))
             })
             .collect::<Result<Vec<_>>>()?
             .into_iter()
@@ -129,11 +129,8 @@ impl Task<'_> {
             .map(|at| {
                 let place = &gathered.estimates[at];
                 let amplitude = amplitude(input, &gathered.members[at], observations);
-                Surfel {
-                    amplitude,
-                    variance_factor: factors[at],
-                    ..surfel(place, options.voxel_m, bends[at], shares(place, &rows[at], common))
-                }
+                let shares = shares(place, &rows[at], common);
+                surfel(place, options.voxel_m, bends[at], shares, factors[at], amplitude)
             })
             .collect();
         let scene = Scene::new(&surfels, input.centres);
@@ -156,19 +153,19 @@ impl Task<'_> {
     }
 }
 
-fn surfel(place: &Estimate, voxel_m: f64, bend: Bend, shares: Shares) -> Surfel {
+fn surfel(place: &Estimate, voxel_m: f64, bend: Bend, shares: Shares, variance_factor: f64, amplitude: f64) -> Surfel {
     let mut frames: Vec<u32> = place.frames.iter().map(|frame| frame.frame).collect();
     frames.sort_unstable();
     Surfel {
         position: place.position - place.normal * bend.above_m,
         normal: place.normal,
         radius_m: place.radius_m(voxel_m),
-        amplitude: f64::NAN,
+        amplitude,
         points: place.count,
         frames,
         shares,
         shape_variance: bend.variance,
-        variance_factor: 1.0,
+        variance_factor,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Errors of fused points against what is said of them.
 
-use fusion::nalgebra::{Matrix3, Vector3};
-use fusion::point_uncertainty::{PointErrors, Source, shares};
+use fusion::nalgebra::{DMatrix, Matrix3, Vector3};
+use fusion::point_uncertainty::{CommonError, CommonErrors, PointErrors, Source, shares};
 use fusion::{CommonErrorUse, FusionOptions, Surfel, fuse};
 
 use crate::common::judge::Judgement;
@@ -70,6 +70,34 @@ fn where_frames_disagree_beyond_what_is_stated_sigma_says_so() {
     let mean = |squares: &[f64]| squares.iter().sum::<f64>() / squares.len() as f64;
     assert!((0.8..1.3).contains(&mean(&told)) && mean(&untold) > 1.6, "{} {}", mean(&told), mean(&untold));
     assert!(disagree * 100 < seen, "{disagree} of {seen}");
+}
+
+/// A wall whose frames are all of one station.
+struct OneStation<'a>(&'a Wall);
+
+impl PointErrors for OneStation<'_> {
+    fn noise(&self, point: usize) -> Matrix3<f64> {
+        self.0.noise(point)
+    }
+
+    fn sensor(&self, _: usize) -> Option<(u64, Vector3<f64>)> {
+        None
+    }
+
+    fn common(&self, _: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
+        derivatives.push((0, Vector3::z()));
+    }
+}
+
+#[test]
+fn frames_without_noise_do_not_disagree() {
+    let wall = Wall::new(10, 40, 3e-9, 0.0, 0.0, 6);
+    let options = FusionOptions { common_errors: CommonErrorUse::AsStated, ..FusionOptions::default() };
+    let pose = CommonError { name: "S0 dz".to_owned(), source: Source::Pose };
+    let common = CommonErrors::new(vec![pose], DMatrix::from_element(1, 1, 0.05 * 0.05)).unwrap();
+    let fused = fuse(&wall.registered(), &OneStation(&wall), &common, &options).unwrap();
+    assert!(!fused.surfels.is_empty());
+    assert!(fused.surfels.iter().all(|surfel| surfel.variance_factor <= 1.0));
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! By how much frames disagree about a surface beyond what is stated of them.
 //!
 //! The heights h that k frames see at a place have the covariance `S = diag(1/w) + R C Rᵀ`, R being their derivatives by the common
-//! errors. Where what is stated is true, their squares about their mean, `hᵀ S⁻¹ h - (1ᵀ S⁻¹ h)² / 1ᵀ S⁻¹ 1`, are chi-squared with
-//! k - 1 degrees of freedom. The squares of the places around over their degrees of freedom are the variance factor of the adjustment, as far
+//! errors. Where what is stated is true, the squares of their differences, weighted by the inverse of the covariance of these, are
+//! chi-squared with k - 1 degrees of freedom. The squares of the places around over their degrees of freedom are the variance factor of the adjustment, as far
 //! as it is seen from there: what no source tells (a sensor that errs by its depth, by the slant of a surface, in steps) is not alike
 //! everywhere.
 
@@ -11,19 +11,18 @@ use point_uncertainty::CommonErrors;
 use rayon::prelude::*;
 use statistics::Distribution;
 
-use super::rows::{Row, form};
+use super::rows::{Row, difference, form};
 use crate::lattice::{Runs, neighbour, neighbours};
 use crate::patches::{ONE_SURFACE, largest_sum};
-use crate::surfels::{Estimate, Gathered};
-use crate::{Error, Result};
+use crate::surfels::{Estimate, FrameSums, Gathered};
 
-/// Cells on each side whose places are asked together. With six, fused points of a Kinect scatter by 0.73 to 1.13 of their sigma, with three by 0.75 to
-/// 1.17; more mix what is not alike.
+/// Cells on each side whose places are asked together. With six, fused points of a Kinect scatter by 0.73 to 1.13 of their sigma, with
+/// three by 0.75 to 1.17; more mix what is not alike.
 const REACH: i64 = 3;
 /// Probability that places which err as stated are said to err by more.
 const LEVEL: f64 = 1e-3;
 
-/// Squares of the heights of a place's frames about their mean, and their degrees of freedom.
+/// Weighted squares of the differences between the heights of a place's frames, and their degrees of freedom.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Squares {
     sum: f64,
@@ -31,32 +30,33 @@ pub(crate) struct Squares {
 }
 
 impl Squares {
-    pub fn new(place: &Estimate, rows: &[Row], common: &CommonErrors) -> Result<Self> {
-        let frames = rows.len();
-        if frames < 2 {
-            return Ok(Self::default());
-        }
-        let mut covariance = DMatrix::zeros(frames, frames);
-        for (at, (frame, row)) in place.frames.iter().zip(rows).enumerate() {
-            for (other, with) in rows[..=at].iter().enumerate() {
-                let both = form(row, with, common.covariance());
+    /// None where a single frame sees the place, or rounding hides how they differ.
+    pub fn new(place: &Estimate, rows: &[Row], common: &CommonErrors) -> Self {
+        let (Some((first, others)), Some((first_row, rows))) = (place.frames.split_first(), rows.split_first()) else {
+            return Self::default();
+        };
+        let size = others.len();
+        // Against the first frame: what all have in common is gone before anything is squared.
+        let by: Vec<Row> = rows.iter().map(|row| difference(row, first_row, 1.0)).collect();
+        let variance = |frame: &FrameSums| 1.0 / frame.normal[(0, 0)];
+        let mut covariance = DMatrix::from_element(size, size, variance(first));
+        for at in 0..size {
+            covariance[(at, at)] += variance(&others[at]);
+            for other in 0..=at {
+                let both = covariance[(at, other)] + form(&by[at], &by[other], common.covariance());
                 (covariance[(at, other)], covariance[(other, at)]) = (both, both);
             }
-            covariance[(at, at)] += 1.0 / frame.normal[(0, 0)];
         }
-        if !dense_matrices::cholesky(covariance.as_mut_slice(), frames) {
-            return Err(Error::Decomposition);
+        if !dense_matrices::cholesky(covariance.as_mut_slice(), size) {
+            return Self::default();
         }
-        let height = |frame: &crate::surfels::FrameSums| {
+        let height = |frame: &FrameSums| {
             (frame.right[0] - frame.normal.row(0).transpose().dot(&place.solution)) / frame.normal[(0, 0)]
         };
-        let heights: Vec<f64> = place.frames.iter().map(height).collect();
-        let (mut of_heights, mut of_ones) = (heights.clone(), vec![1.0; frames]);
-        dense_matrices::solve_cholesky(covariance.as_slice(), frames, &mut of_heights, 1);
-        dense_matrices::solve_cholesky(covariance.as_slice(), frames, &mut of_ones, 1);
-        let squares: f64 = heights.iter().zip(&of_heights).map(|(height, weighted)| height * weighted).sum();
-        let (along, weight): (f64, f64) = (of_heights.iter().sum(), of_ones.iter().sum());
-        Ok(Self { sum: squares - along * along / weight, dof: frames as f64 - 1.0 })
+        let heights: Vec<f64> = others.iter().map(|frame| height(frame) - height(first)).collect();
+        let mut weighted = heights.clone();
+        dense_matrices::solve_cholesky(covariance.as_slice(), size, &mut weighted, 1);
+        Self { sum: heights.iter().zip(&weighted).map(|(height, weighted)| height * weighted).sum(), dof: size as f64 }
     }
 }
 

@@ -59,7 +59,11 @@ impl ResultCloud {
     /// Reads the cloud of a result, and its common errors where there are any.
     pub(crate) fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(CLOUD);
-        if !path.exists() && folder.join(TILES).exists() {
+        if !path.exists() && !folder.join(TILES).exists() {
+            let folder = folder.display();
+            return Err(request(format!("{folder}: is no result of `rangecam run`, which has a {CLOUD}")));
+        }
+        if !path.exists() {
             return Err(request(format!(
                 "{}: its points are in tiles ({TILES}), which are for viewers: run the pipeline again on the part that matters, or with \
                  a larger --tiles-above",

@@ -107,8 +107,8 @@ pub enum Error {
     Coincident(usize),
     /// Nowhere enough points on a plane.
     #[error(
-        "no surface among {points} points in {cells} cells of {voxel_m} m ({per_cell:.1} a cell, extent {extent_m} m): \
-         take larger cells, or give the points in metre"
+        "no surface among {points} points in {cells} cells of {voxel_m} m ({per_cell:.1} a cell, extent {extent_m:.3} m): \
+         take {} cells, or give the points in metre", other_cells(.voxel_m, .extent_m)
     )]
     NoSurface {
         /// Points.
@@ -136,3 +136,8 @@ pub enum Error {
 }
 
 pub(crate) type Result<T> = std::result::Result<T, Error>;
+
+/// Which cells serve rather than those in which nothing was found: a surface has four on its side and more.
+fn other_cells(voxel_m: &f64, extent_m: &f64) -> &'static str {
+    if 4.0 * voxel_m > *extent_m { "smaller" } else { "larger" }
+}

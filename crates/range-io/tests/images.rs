@@ -66,6 +66,14 @@ fn stored_depths_become_metres_and_invalid_ones_nan() {
 }
 
 #[test]
+fn a_folder_of_images_with_other_names_says_what_it_lacks() {
+    let folder = tempfile::tempdir().unwrap();
+    png16::write(folder.path().join("00000.png"), &Raster::filled(2, 2, 1)).unwrap();
+    let refused = Survey::read(folder.path()).unwrap_err().to_string();
+    assert!(refused.contains("survey.ron") && refused.contains("depth.txt"), "{refused}");
+}
+
+#[test]
 fn other_and_cut_images_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("depth.png");

@@ -135,9 +135,9 @@ impl<'a> Surroundings<'a, '_> {
     }
 }
 
-/// One point against one place.
+/// A place whose surface a point may be of.
 #[derive(Debug, Clone, Copy)]
-struct Meeting {
+struct PlaceInReach {
     place: u32,
     at: usize,
     /// Where the ray meets the plane.
@@ -152,7 +152,7 @@ struct Chooser<'a> {
     around: Vec<(u32, &'a Seed)>,
     voxel_m: f64,
     gate: f64,
-    near: Vec<Meeting>,
+    near: Vec<PlaceInReach>,
 }
 
 impl Chooser<'_> {
@@ -173,7 +173,7 @@ impl Chooser<'_> {
             let sigma = sigma(point, common, seed);
             let normalised = height.abs() / sigma;
             if normalised <= self.gate {
-                self.near.push(Meeting { place: *place, at, foot, normalised, sigma, lateral_2 });
+                self.near.push(PlaceInReach { place: *place, at, foot, normalised, sigma, lateral_2 });
             }
         }
         let Some(nearest) = self.near.iter().min_by(|a, b| a.normalised.total_cmp(&b.normalised)) else {
@@ -195,7 +195,7 @@ impl Chooser<'_> {
 
     /// A surface of another direction that a point of the chosen one could belong to, wherever noise has put it, or that hides
     /// the chosen one from it.
-    fn crossing(&self, point: &Observation, common: &small::Symmetric, layer: u32, best: &Meeting) -> Option<u32> {
+    fn crossing(&self, point: &Observation, common: &small::Symmetric, layer: u32, best: &PlaceInReach) -> Option<u32> {
         let normal = self.around[best.at].1.normal;
         let reach_2 = (REACH * self.voxel_m).powi(2);
         let hidden_2 = (HIDES * self.voxel_m).powi(2);

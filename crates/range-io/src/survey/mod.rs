@@ -21,7 +21,7 @@ pub use range_image::PhaseSense;
 pub use truth::{TruthFrame, read_truth, write_truth};
 pub use write::write_frame;
 
-use crate::{Result, read_ron_text, text::ron_text};
+use crate::{Error, Result, read_ron_text, text::ron_text};
 
 /// What was captured: `survey.ron`. Angles in radian, lengths of the camera in millimetre, times in second.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -187,12 +187,13 @@ impl Survey {
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let file = if path.is_dir() { path.join(Self::FILE_NAME) } else { path.to_path_buf() };
-        #[cfg(feature = "png16")]
-        if path.is_dir()
-            && !file.exists()
-            && let Some(survey) = sequence::read_sequence(path)?
-        {
-            return Ok(survey);
+        if path.is_dir() && !file.exists() {
+            #[cfg(feature = "png16")]
+            if let Some(survey) = sequence::read_sequence(path)? {
+                return Ok(survey);
+            }
+            let reason = "holds no survey.ron, and no depth images of names that are known (depth.txt, frame-000000.depth.png): name its files in a survey.ron";
+            return Err(Error::format(path, reason));
         }
         Self::parse(&file, &read_ron_text(&file)?)
     }

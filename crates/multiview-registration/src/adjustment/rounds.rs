@@ -10,7 +10,7 @@ use crate::adjustment::network::{Anchors, Network, State, largest_step};
 use crate::error::Result;
 use crate::planes::contacts::{Contact, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, reduce};
-use crate::surfaces::extents::{Extent, Extents};
+use crate::surfaces::extents::Extent;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::point_model::PointModel;
@@ -124,7 +124,7 @@ pub(crate) fn near_each_other(
         Ok(Extent::placed(centres, pose))
     };
     let extents = surfaces.iter().zip(poses).map(extent).collect::<Result<Vec<Extent>>>()?;
-    Ok(Extents::new(&extents).pairs(reach.farthest_m(size_m)))
+    Ok(Extent::pairs(&extents, reach.farthest_m(size_m)))
 }
 
 /// All pairs in contact at these poses; `only`: the pairs to look at (target, source).
@@ -141,40 +141,14 @@ pub(crate) fn meet(
             let (from, to) = (surfaces[source], surfaces[target]);
             let forward = partners(from, to, &pose, reach)?;
             let back = partners(to, from, &pose.inverse(), reach)?;
-            let contact = |source, target, asked_by_source| Contact { source, target, asked_by_source, share: 0.0 };
-            let contacts = forward.iter().map(|&(source, target)| contact(source, target, true));
-            let contacts = contacts.chain(back.iter().map(|&(target, source)| contact(source, target, false)));
+            let back = back.into_iter().map(|(target, source)| (source, target));
+            let contacts = forward.into_iter().chain(back).map(|(source, target)| Contact { source, target });
             Ok(PairContacts { target, source, contacts: contacts.collect() })
         })
         .collect();
     let mut pairs_in_contact = found?;
     pairs_in_contact.retain(|pair_contacts| pair_contacts.contacts.len() >= 2 * FEWEST_CONTACTS);
-    share(surfaces, &mut pairs_in_contact);
     Ok(pairs_in_contact)
-}
-
-/// A patch that k − 1 other stations see as well observes k − 1 differences, each of which would count fully only if
-/// its own error entered once: with weights 1/k the squares are those about the common surface.
-fn share(surfaces: &[&Surface], pairs_in_contact: &mut [PairContacts]) {
-    let mut seen: Vec<Vec<u32>> = surfaces.iter().map(|surface| vec![1; surface.patches.len()]).collect();
-    for pair_contacts in pairs_in_contact.iter() {
-        for contact in &pair_contacts.contacts {
-            let (station, patch) = asking(pair_contacts.target, pair_contacts.source, contact);
-            seen[station][patch] += 1;
-        }
-    }
-    for pair_contacts in pairs_in_contact.iter_mut() {
-        let (target, source) = (pair_contacts.target, pair_contacts.source);
-        for contact in &mut pair_contacts.contacts {
-            let (station, patch) = asking(target, source, contact);
-            contact.share = 1.0 / f64::from(seen[station][patch]);
-        }
-    }
-}
-
-/// The station and the patch that looked for its partner.
-fn asking(target: usize, source: usize, contact: &Contact) -> (usize, usize) {
-    if contact.asked_by_source { (source, contact.source as usize) } else { (target, contact.target as usize) }
 }
 
 /// Standard deviation of the whitened residuals of all contacts, from their median.
@@ -184,7 +158,7 @@ fn scale(scene: &Scene<'_>, pairs_in_contact: &[PairContacts], poses: &[Isometry
         pair_contacts
             .contacts
             .iter()
-            .map(|contact| scene.whitened_residual(pair_contacts, contact, &pose).abs())
+            .map(|&contact| scene.whitened_residual(pair_contacts, contact, &pose).abs())
             .collect()
     };
     let mut residuals: Vec<f64> = pairs_in_contact.par_iter().map(of_pair).collect::<Vec<_>>().concat();

@@ -1,10 +1,11 @@
-//! Loops of pairs: how they close, and which pairs are wrong.
+//! Loops of pairs: how they close, and the tree of the pairs that most of them confirm.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector6};
 
-use crate::agreement::alignments::{PairAlignment, RefusedPair};
+use crate::agreement::alignments::PairAlignment;
+use pose_graph::is_likely;
 use rigid_pose::Uncertain;
 use rigid_pose::pose_difference;
 
@@ -28,6 +29,7 @@ fn step(pair: &PairAlignment, from: usize) -> (usize, Uncertain) {
     if pair.target == from { (pair.source, step) } else { (pair.target, step.inverse()) }
 }
 
+/// How far from coming back a way is.
 fn closure(pairs: &[PairAlignment], first: usize, way: &[usize]) -> LoopClosure {
     let (mut at, mut total) = (first, Uncertain::exact(Isometry3::identity()));
     let mut stations = vec![first];
@@ -38,11 +40,6 @@ fn closure(pairs: &[PairAlignment], first: usize, way: &[usize]) -> LoopClosure 
         stations.push(next);
     }
     stations.pop();
-    misclosure(stations, &total)
-}
-
-/// How far from coming back a way is.
-fn misclosure(stations: Vec<usize>, total: &Uncertain) -> LoopClosure {
     let v: Vector6<f64> = pose_difference(&Isometry3::identity(), &total.pose);
     let square = total.covariance.cholesky().map_or(f64::INFINITY, |factor| v.dot(&factor.solve(&v)));
     LoopClosure {
@@ -107,8 +104,6 @@ pub(crate) struct SpanningTree {
     /// The pairs of the tree, from its root outwards.
     pub tree: Vec<usize>,
     reached_by: Vec<Option<(usize, usize)>>,
-    /// For each pair whether the others agree with it.
-    pub sound: Vec<bool>,
     /// Triangles, and each pair outside the tree with the tree's way between its stations.
     pub loops: Vec<LoopClosure>,
 }
@@ -120,14 +115,8 @@ impl SpanningTree {
     }
 }
 
-/// Which pairs agree with the tree of those that most loops confirm, and how the loops close; `closes`: whether that is near
-/// enough.
-pub(crate) fn spanning_tree(
-    pairs: &[PairAlignment],
-    root: (usize, Isometry3<f64>),
-    stations: usize,
-    closes: &dyn Fn(&LoopClosure) -> bool,
-) -> SpanningTree {
+/// The tree of the pairs that most triangles confirm, each at the 99.9 % level, from a station outwards, and how all loops close.
+pub(crate) fn spanning_tree(pairs: &[PairAlignment], root: usize, stations: usize) -> SpanningTree {
     let mut votes = vec![0_i64; pairs.len()];
     let mut loops = Vec::new();
     for triangle in triangles(pairs) {
@@ -135,7 +124,7 @@ pub(crate) fn spanning_tree(
         let way = ordered(pairs, first, triangle);
         let closure = closure(pairs, first, &way);
         for pair in triangle {
-            votes[pair] += if closes(&closure) { 1 } else { -1 };
+            votes[pair] += if is_likely(closure.mahalanobis.powi(2)) { 1 } else { -1 };
         }
         loops.push(closure);
     }
@@ -145,29 +134,18 @@ pub(crate) fn spanning_tree(
         let key = |k: usize| (votes[k].signum(), pairs[k].result.degenerate.is_empty(), votes[k]);
         key(b).cmp(&key(a)).then(pairs[b].result.overlap.total_cmp(&pairs[a].result.overlap)).then(a.cmp(&b))
     });
-    let mut poses = vec![None; stations];
     let (mut reached_by, mut tree) = (vec![None; stations], Vec::new());
-    poses[root.0] = Some(root.1);
-    while let Some(&next) =
-        order.iter().find(|&&k| poses[pairs[k].target].is_some() != poses[pairs[k].source].is_some())
-    {
-        let pair = &pairs[next];
-        let from = if poses[pair.target].is_some() { pair.target } else { pair.source };
-        let (to, relative) = step(pair, from);
-        poses[to] = poses[from].map(|pose: Isometry3<f64>| pose * relative.pose);
+    let mut is_reached = vec![false; stations];
+    is_reached[root] = true;
+    while let Some(&next) = order.iter().find(|&&k| is_reached[pairs[k].target] != is_reached[pairs[k].source]) {
+        let PairAlignment { target, source, .. } = pairs[next];
+        let (from, to) = if is_reached[target] { (target, source) } else { (source, target) };
+        is_reached[to] = true;
         reached_by[to] = Some((from, next));
         tree.push(next);
     }
-    let sound = pairs.iter().map(|pair| match (poses[pair.target], poses[pair.source]) {
-        (Some(target), Some(source)) => {
-            let back = Uncertain::exact(source.inverse() * target);
-            closes(&misclosure(vec![pair.target, pair.source], &step(pair, pair.target).1.then(&back)))
-        }
-        _ => false,
-    });
-    let sound = sound.collect();
     loops.extend(long_loops(pairs, &reached_by));
-    SpanningTree { tree, reached_by, sound, loops }
+    SpanningTree { tree, reached_by, loops }
 }
 
 /// The three pairs in the order in which they lead from `first` back to it.
@@ -208,10 +186,4 @@ fn long_loops(pairs: &[PairAlignment], reached_by: &[Option<(usize, usize)>]) ->
         }
     }
     loops
-}
-
-/// The pair as refused because of the others.
-pub(crate) fn contradicting(pair: &PairAlignment) -> RefusedPair {
-    let reason = "contradicts the loops that the other pairs close".to_owned();
-    RefusedPair { target: pair.target, source: pair.source, reason }
 }

@@ -3,7 +3,7 @@
 use global_registration::FeatureCloud;
 use nalgebra::{Isometry3, Point3};
 
-use crate::surfaces::extents::{Extent, Extents};
+use crate::surfaces::extents::Extent;
 
 /// Voxels beyond the farthest point of a cloud at which a point may still lie on what it saw or before it.
 const BEYOND_VOXELS: f64 = 5.0;
@@ -41,12 +41,11 @@ pub(crate) fn may_judge<'a>(
     let nowhere = Extent::of(std::iter::empty());
     let extents: Vec<Extent> =
         (0..count).map(|station| placed(station).map_or(nowhere, |(sight, pose)| sight.extent(&pose))).collect();
-    let tree = Extents::new(&extents);
     let mut pairs = Vec::new();
     for station in 0..count {
         let Some((sight, pose)) = placed(station) else { continue };
         let around = Extent::about(&pose.translation.vector, sight.reach_m);
-        let near = tree.near(&around, 0.0).into_iter().filter(|&other| other != station);
+        let near = (0..count).filter(|&other| other != station && extents[other].meets(&around, 0.0));
         let judged = near.filter(|&other| sight.may_judge(&pose, &extents[other]));
         pairs.extend(judged.map(|other| (station.min(other), station.max(other))));
     }

@@ -16,12 +16,10 @@ use crate::survey::registration::Start;
 use projective_registration::{Agreement, FrameAlignmentOptions, OrganisedFrame, SharedError};
 use rigid_pose::InputError;
 
-/// Share of a frame that another must be expected to see for the two to be aligned.
-const LEAST_OVERLAP: f64 = 0.3;
 /// By how much surfaces may stand apart at start poses, share of the depth: poses that err by 5 cm and 2 degrees an axis move them by some
 /// 0.05 against each other at 2 m. Larger ones only try more pairs.
 const START_ERROR: f32 = 0.15;
-/// As [`LEAST_OVERLAP`], at start poses: their errors hide up to half of what two frames share.
+/// Share of a frame that another must be expected to see at start poses: their errors hide half of what two frames share.
 const START_OVERLAP: f64 = 0.15;
 /// Pairs of a frame that are tried, those with the most overlap.
 const PARTNERS: usize = 6;
@@ -229,7 +227,7 @@ impl<'a> Survey<'a> {
             let tried = self.tried.contains(&(a, b)) || self.pairs.iter().any(|pair| pair.joins(a, b));
             (!tried).then_some(pose)
         };
-        self.overlapping((Agreement::LARGEST_ERROR, LEAST_OVERLAP), Guess::Near, open)
+        self.overlapping((Agreement::LARGEST_ERROR, Agreement::LEAST_OVERLAP), Guess::Near, open)
     }
 
     /// For each frame the pairs with the most overlap, at poses `a_from_b`, where surfaces lie within an error, a part of the depth, on
@@ -326,8 +324,10 @@ impl<'a> Survey<'a> {
         let (used, wrong): (Vec<_>, Vec<_>) = sound.iter().zip(&graph.fits).partition(|(_, fits)| **fits);
         let placed = |pair: &PairAlignment| [pair.target, pair.source].iter().all(|k| graph.index(*k).is_some());
         let wrong = wrong.iter().map(|(pair, _)| &pair.alignment).filter(|pair| placed(pair));
-        let contradicting = wrong.map(crate::agreement::loops::contradicting);
-        self.refused.extend(contradicting);
+        self.refused.extend(wrong.map(|&PairAlignment { target, source, .. }| {
+            let reason = "contradicts the loops that the other pairs close".to_owned();
+            RefusedPair { target, source, reason }
+        }));
         let lost = |frame: &usize| graph.index(*frame).is_none() && !self.is_out(*frame);
         let lost: Vec<UnplacedFrame> =
             (0..self.count()).filter(lost).map(|frame| UnplacedFrame { frame, reason: self.why(frame) }).collect();

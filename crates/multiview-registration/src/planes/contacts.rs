@@ -15,10 +15,6 @@ pub(crate) const BESIDE: f64 = 0.75;
 pub(crate) struct Contact {
     pub source: u32,
     pub target: u32,
-    /// Whether the source's patch looked for its partner, or the target's.
-    pub asked_by_source: bool,
-    /// Share of this contact in what the patch that asked observes.
-    pub share: f64,
 }
 
 /// How partners are looked for.
@@ -110,7 +106,7 @@ pub(crate) struct Observed {
 pub(crate) fn observe(
     source: &Surface,
     target: &Surface,
-    contact: &Contact,
+    contact: Contact,
     target_from_source: &Isometry3<f64>,
 ) -> Observed {
     let (from, to) = (&source.patches[contact.source as usize], &target.patches[contact.target as usize]);
@@ -145,7 +141,7 @@ fn along_direction(
 /// something about sliding.
 pub(crate) fn imitated(
     source: &Surface,
-    contact: &Contact,
+    contact: Contact,
     observed: &Observed,
     target_from_source: &Isometry3<f64>,
 ) -> Matrix6<f64> {

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::planes::contacts::Contact;
 use crate::planes::reduction::PairContacts;
 use crate::planes::tiles::Tiles;
-use crate::surfaces::extents::{Extent, Extents};
+use crate::surfaces::extents::Extent;
 use crate::surfaces::grouping::cell;
 use crate::surfaces::patches::{Surface, axes};
 use crate::surfaces::plane_fit::{Moments, SAME_DIRECTION};
@@ -149,7 +149,7 @@ impl<'a> Joined<'a> {
         let pieces: Vec<(usize, Piece)> =
             centres.into_iter().map(|(root, centres)| (root, Piece::new(centres, reach_m))).collect();
         let extents: Vec<Extent> = pieces.iter().map(|(_, piece)| piece.extent).collect();
-        for (a, b) in Extents::new(&extents).pairs(reach_m) {
+        for (a, b) in Extent::pairs(&extents, reach_m) {
             let ((a, first_piece), (b, second_piece)) = (&pieces[a], &pieces[b]);
             let (first, second) = (self.normals[self.root(*a)], self.normals[self.root(*b)]);
             if self.root(*a) != self.root(*b)

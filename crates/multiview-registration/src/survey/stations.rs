@@ -9,14 +9,13 @@ use crate::adjustment::network::{Network, State};
 use crate::adjustment::precision;
 use crate::adjustment::rounds::FEWEST_CONTACTS;
 use crate::adjustment::simultaneous::Adjusted;
-use crate::agreement::alignments::Overlap;
-use crate::agreement::loops::reached;
+use crate::agreement::alignments::{Overlap, PairAlignment};
+use crate::agreement::loops::{LoopClosure, reached};
 use crate::agreement::placement::{Placements, judge_placements};
 use crate::error::{Error, Result};
 use crate::relative_pose::check_poses;
 use crate::surfaces::point_model::SharedParameters;
 use crate::surfaces::points::StationPoints;
-use crate::survey::check::{Checked, checked};
 use crate::survey::datum::Datum;
 use crate::survey::registration::{
     Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
@@ -35,8 +34,8 @@ const MOST_ARRANGED: usize = 200;
 ///
 /// Wide rounds bring the stations together where patches of their surfaces meet, all overlaps in one system with contacts
 /// found anew in each round (`[ChenMedioni1992]`, `[Pulli1999]`). The last rounds take all points: each station's pieces of
-/// a surface are joined to shared planes, whose planes are unknown too and eliminated exactly. Then pairs are held against their
-/// loops. `progress(done, total)` is told the rounds of each part.
+/// a surface are joined to shared planes, whose planes are unknown too and eliminated exactly. Then loops of
+/// pairs are closed. `progress(done, total)` is told the rounds of each part.
 ///
 /// Clouds without normals get them from their nearest neighbours.
 ///
@@ -59,8 +58,8 @@ pub fn register_stations(
     let network = network(datum, radius_m, options, (&prior, &names), whole);
     require_connected(&adjusted, datum)?;
     let placements = judged.map_or_else(|| placements(stations, points, &adjusted.state), Ok)?;
-    let checked = checked(&adjusted, options.minimum_overlap, datum, (radius_m, patch_m))?;
-    let result = result(checked, adjusted, &start, &network, datum, patch_m);
+    let alone = adjusted.alone(options.minimum_overlap, datum.held_station(), (radius_m, patch_m))?;
+    let result = result(alone, adjusted, &start, &network, datum, patch_m);
     Ok(StationRegistration { placements, prepared: Arc::new(prepared), ..result })
 }
 
@@ -134,7 +133,7 @@ fn placements(stations: &[Cloud], points: Vec<StationPoints>, state: &State) -> 
 }
 
 fn result(
-    checked: Checked,
+    (pairs, loops): (Vec<PairAlignment>, Vec<LoopClosure>),
     adjusted: Adjusted,
     start: &[Isometry3<f64>],
     network: &Network<'_>,
@@ -151,9 +150,8 @@ fn result(
     StationRegistration {
         covariance: (0..count).map(|k| joint.between(k, k)).collect(),
         world_from_station: poses,
-        pairs: checked.pairs,
-        refused: checked.refused,
-        loops: checked.loops,
+        pairs,
+        loops,
         surfaces,
         placements: Placements::default(),
         undetermined,

@@ -121,6 +121,7 @@ pub(crate) fn brought_together(
         Some((modelled, _)) => modelled,
         None => surfaces,
     };
+    adjusted.factor = adjusted.factor_of_wide_errors();
     Ok(Brought { adjusted, start, points, placements, prepared, radius_m, patch_m })
 }
 
@@ -169,7 +170,7 @@ impl Again<'_> {
                 let mut placements = judge_placements(self.stations, &adjusted.state.poses)?;
                 let doubtful = places.looked_through.doubtful(&adjusted.state.poses);
                 placements.doubt(moved.into_iter().chain(doubtful));
-                return Ok((adjusted.with_factor(), Some(placements)));
+                return Ok((adjusted, Some(placements)));
             }
             let mut state = State { poses, ..adjusted.state.clone() };
             let fixed = finish.network.fixed;

@@ -1,6 +1,6 @@
 //! The wide rounds: contacts of patches found anew, all pairs reduced, all stations moved.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 use rigid_pose::InputError;
 use statistics::mad_scale;
@@ -13,7 +13,7 @@ use crate::planes::reduction::{PairContacts, Reduced, Scene, reduce};
 use crate::surfaces::extents::Extent;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
-use crate::surfaces::point_model::PointModel;
+use crate::surfaces::point_model::{PointModel, evaluated};
 use crate::surfaces::points::StationPoints;
 
 /// Most rounds of a level, and the part of its limit that a step must be below for it to end.
@@ -77,18 +77,9 @@ fn at_parameters(
     count: usize,
     parameters: &[f64],
 ) -> Result<(Surface, Vec<[f64; 3]>)> {
-    let m = parameters.len();
-    let mut points = vec![Point3::origin(); count];
-    let mut of_points = vec![[0.0; 3]; count * m];
-    for index in surface.members.iter().map(|&index| index as usize) {
-        points[index] = model.point(station, index, parameters, Some(&mut of_points[index * m..(index + 1) * m]));
-    }
-    rigid_pose::require_points("points of the point model", &points)?;
-    if let Some(index) = of_points.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
-        return Err(InputError::NonFinite { what: "derivatives of the point model", index }.into());
-    }
+    let (points, of_points) = evaluated(model, station, count, parameters)?;
     let surface = surface.refitted(&points)?;
-    let derivatives = averaged(&surface, &of_points, m);
+    let derivatives = averaged(&surface, &of_points, parameters.len());
     Ok((surface, derivatives))
 }
 

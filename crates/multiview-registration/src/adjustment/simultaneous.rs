@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::equations::{Equations, MOST_ELIMINATED};
-use crate::adjustment::joints::Joint;
 use crate::adjustment::known::Known;
 use crate::adjustment::network::{Network, State, largest_step};
 use crate::adjustment::rounds::{Surfaces, meet, near_each_other};
@@ -18,6 +17,7 @@ use crate::planes::scatter::{Scatter, TileMean, between, tile_means, variances};
 use crate::planes::shared_planes::{SharedPlane, shared_planes};
 use crate::planes::sightings::{Gate, sightings};
 use crate::planes::sums::Sums;
+use crate::relative_pose::RelativePose;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::points::StationPoints;
 use rigid_pose::pose_difference;
@@ -123,7 +123,7 @@ pub(crate) struct Finish<'a> {
     pub most_rounds: usize,
     pub progress: &'a (dyn Fn(usize) + Sync),
     /// What is known of many stations beside what surfaces tell.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<RelativePose>,
 }
 
 impl Finish<'_> {
@@ -146,7 +146,7 @@ impl Finish<'_> {
                 let near = near_each_other(&scene.surfaces, &state.poses, reach)?;
                 pairs_tried = near.len();
                 let pairs_in_contact = meet(&scene.surfaces, &state.poses, &near, reach)?;
-                known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m);
+                known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m)?;
             }
             let first = round == 0;
             let (slack_m, stride) = if first { (OFF[0] * size_m, FIRST_STRIDE) } else { (0.0, 1) };
@@ -244,12 +244,12 @@ impl Finish<'_> {
         let planes = seen.clone().filter(|(_, eliminated)| matches!(eliminated.products, Products::Beside(_))).count();
         let mut equations = Equations::new(state.poses.len(), Some(network.fixed), state.parameters.len(), planes);
         seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
-        equations.add_prior(network.prior, &state.parameters);
+        equations.add_prior(&network.prior, &state.parameters);
         for turn in network.turns {
             equations.add_turn(turn, &state.poses);
         }
         for joint in &self.joints {
-            joint.add_to(&mut equations, &state.poses);
+            equations.add_relative_pose(joint, None, &DVector::zeros(1), &state.poses);
         }
         let step = equations.step(&equations.cofactors(self.near)?);
         Ok((step, equations.cofactors(network.held())?))

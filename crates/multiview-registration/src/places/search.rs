@@ -9,7 +9,6 @@ use global_registration::{FreeSpace, Look, LookedThrough};
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use crate::adjustment::joints::Joint;
 use crate::adjustment::known::Known;
 use crate::adjustment::network::Network;
 use crate::adjustment::rounds::FEWEST_CONTACTS;
@@ -18,6 +17,7 @@ use crate::error::Result;
 use crate::places::sought::Sought;
 use crate::planes::sightings::{APART, Gate, NOWHERE, Sighting, Wide, members};
 use crate::planes::sums::Sums;
+use crate::relative_pose::RelativePose;
 use crate::surfaces::extents::Extent;
 use crate::surfaces::points::{Block, StationPoints};
 
@@ -75,7 +75,7 @@ impl<'a> Places<'a> {
     pub(crate) fn improved(
         &self,
         poses: &mut [Isometry3<f64>],
-        joints: &mut Vec<Joint>,
+        joints: &mut Vec<RelativePose>,
         last: Option<&BTreeSet<usize>>,
     ) -> Result<(BTreeSet<usize>, bool)> {
         let tiles = self.adjusted.shared_planes.last().map_or(0, |plane| plane.tiles.first + plane.tiles.len());

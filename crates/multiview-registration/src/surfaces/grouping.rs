@@ -39,7 +39,7 @@ pub(crate) fn by_cells(cloud: &Cloud, usable: impl Fn(usize) -> bool, size_m: f6
 }
 
 /// The cell of space that a point lies in.
-pub(crate) fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
+fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
     <[f64; 3]>::from(point.coords).map(|x| (x / size_m).floor() as i64)
 }
 

@@ -20,7 +20,7 @@ use crate::survey::datum::Datum;
 use crate::survey::registration::{
     Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
-use crate::survey::together::{Brought, brought_together, is_whole, network, prior_of};
+use crate::survey::together::{Brought, brought_together, is_whole};
 use point_cloud::Cloud;
 use rigid_pose::{InputError, require_option, require_positive};
 
@@ -51,14 +51,12 @@ pub fn register_stations(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<StationRegistration> {
     validate(stations, start, datum, options)?;
-    let (prior, names) = prior_of(options)?;
     let whole = is_whole(stations.len(), start, options);
-    let Brought { adjusted, start, points, placements: judged, prepared, radius_m, patch_m } =
+    let Brought { adjusted, start, points, placements: judged, prepared, network, patch_m } =
         brought_together(stations, start, datum, (options, whole), progress)?;
-    let network = network(datum, radius_m, options, (&prior, &names), whole);
     require_connected(&adjusted, datum)?;
     let placements = judged.map_or_else(|| placements(stations, points, &adjusted.state), Ok)?;
-    let alone = adjusted.alone(options.minimum_overlap, datum.held_station(), (radius_m, patch_m))?;
+    let alone = adjusted.alone(options.minimum_overlap, datum.held_station(), (network.hold_m, patch_m))?;
     let result = result(alone, adjusted, &start, &network, datum, patch_m);
     Ok(StationRegistration { placements, prepared: Arc::new(prepared), ..result })
 }
@@ -226,7 +224,7 @@ fn shared(network: &Network<'_>, values: &[f64], joint: &nalgebra::DMatrix<f64>)
         if sigma > 0.0 { (values[k] - network.prior.0[k]) / sigma } else { 0.0 }
     };
     SharedParameters {
-        names: network.names.to_vec(),
+        names: network.names.clone(),
         values: values.to_vec(),
         covariance: (0..m).map(|r| (0..m).map(|c| joint[(first + r, first + c)]).collect()).collect(),
         prior: network.prior.0.clone(),

@@ -33,7 +33,7 @@ fn stations_without_a_held_one_come_where_those_with_one_do() {
         covariance: nalgebra::Matrix3::identity() * 1e-6,
     };
     let (prior, turns) = ((Vec::new(), Vec::new()), [turn]);
-    let network = Network { fixed: 2, hold_m: 3.0, names: &[], prior: &prior, turns: &turns, whole: true };
+    let network = Network { fixed: 2, hold_m: 3.0, names: Vec::new(), prior, turns: &turns, whole: true };
     let state = State { poses: poses.clone(), parameters: Vec::new() };
     let held = Anchors { fixed: Some(2), poses: &poses, known: network.held(), factor: 1.0 };
     let solved = |anchors: &Anchors<'_>, steps: usize| {

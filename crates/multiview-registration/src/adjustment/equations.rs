@@ -11,7 +11,7 @@ use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::known::Known;
 use crate::adjustment::turns::MeasuredTurn;
 use crate::error::Result;
-use crate::planes::elimination::{Eliminated, Products, WideProducts, motion_of};
+use crate::planes::elimination::{Eliminated, Products, motion_of};
 use crate::planes::shared_planes::SharedPlane;
 use crate::relative_pose::{RelativePose, relative_pose_parts};
 use crate::surfaces::point_model::Prior;
@@ -57,7 +57,19 @@ impl Equations {
                 }
                 self.add_shared(eliminated, products, &motions);
             }
-            Products::Beside(wide) => self.add_wide(&eliminated.stations, &motions, wide),
+            Products::Beside(pairs, of_plane) => {
+                for (&pair, products) in pairs {
+                    self.add_pair(&eliminated.stations, &motions, pair, products);
+                }
+                let plane = self.next;
+                self.next += 1;
+                for (k, (&station, motion)) in eliminated.stations.iter().zip(&motions).enumerate() {
+                    let block = eliminated.from_motions.fixed_view::<3, 3>(0, 3 * k) * motion.transpose();
+                    self.normal.add(plane, station, |i, j| -block[(i, j)]);
+                }
+                self.normal.add(plane, plane, |i, j| 0.5 * (of_plane[(i, j)] + of_plane[(j, i)]));
+                self.add_right(plane, (-eliminated.from_distances).as_slice());
+            }
         }
     }
 
@@ -90,20 +102,6 @@ impl Equations {
         let own = products.view((first, first), (count, count));
         self.normal.add(self.stations, self.stations, |i, j| 0.5 * (own[(i, j)] + own[(j, i)]));
         self.add_right(self.stations, &eliminated.right.as_slice()[first..]);
-    }
-
-    fn add_wide(&mut self, stations: &[usize], motions: &[Matrix6x3<f64>], wide: &WideProducts) {
-        for (&pair, products) in &wide.pairs {
-            self.add_pair(stations, motions, pair, products);
-        }
-        let plane = self.next;
-        self.next += 1;
-        for (k, (&station, motion)) in stations.iter().zip(motions).enumerate() {
-            let block = wide.with_plane.fixed_view::<3, 3>(0, 3 * k) * motion.transpose();
-            self.normal.add(plane, station, |i, j| block[(i, j)]);
-        }
-        self.normal.add(plane, plane, |i, j| 0.5 * (wide.of_plane[(i, j)] + wide.of_plane[(j, i)]));
-        self.add_right(plane, wide.right.as_slice());
     }
 
     /// Adds a relative pose. Along its rows the motion from there, and what shared parameters do where some are given, leaves `right`.

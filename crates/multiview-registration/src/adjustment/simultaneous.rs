@@ -241,7 +241,7 @@ impl Finish<'_> {
         seen: impl Iterator<Item = (&'s SharedPlane, &'s Eliminated)> + Clone,
     ) -> Result<(DVector<f64>, Cofactors)> {
         let network = self.network;
-        let planes = seen.clone().filter(|(_, eliminated)| matches!(eliminated.products, Products::Beside(_))).count();
+        let planes = seen.clone().filter(|(_, eliminated)| matches!(eliminated.products, Products::Beside(..))).count();
         let mut equations = Equations::new(state.poses.len(), Some(network.fixed), state.parameters.len(), planes);
         seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
         equations.add_prior(&network.prior, &state.parameters);

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Matrix6};
 
-use crate::agreement::alignments::{PairAlignment, RefusedPair};
+use crate::agreement::alignments::{Overlap, PairAlignment, RefusedPair, best_partners};
 use crate::agreement::loops::{LoopClosure, reached};
 use crate::agreement::placement::{PairAgreement, Placements};
 use crate::error::{Error, Result};
@@ -243,21 +243,13 @@ impl<'a> Survey<'a> {
         for target in 0..self.count() {
             for source in target + 1..self.count() {
                 let Some(pose) = pose(target, source) else { continue };
-                let overlap = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4, error);
-                if overlap >= least {
-                    found.push((overlap, Candidate { target, source, guess: guess(pose) }));
-                }
+                let fraction = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4, error);
+                found.push(Overlap { target, source, fraction });
             }
         }
-        found.sort_by(|x, y| y.0.total_cmp(&x.0));
-        let mut partners = vec![0; self.count()];
-        found.retain(|(_, pair)| {
-            let wanted = partners[pair.target].min(partners[pair.source]) < PARTNERS;
-            partners[pair.target] += usize::from(wanted);
-            partners[pair.source] += usize::from(wanted);
-            wanted
-        });
-        found.into_iter().map(|(_, pair)| pair).collect()
+        let chosen = best_partners(&found, self.count(), least, PARTNERS).into_iter();
+        let candidate = |(target, source)| Some(Candidate { target, source, guess: guess(pose(target, source)?) });
+        chosen.filter_map(candidate).collect()
     }
 
     /// Frames that are not placed yet with placed ones near them in order, without a guess; each pair once.

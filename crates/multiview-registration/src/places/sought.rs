@@ -103,7 +103,7 @@ impl<'a> Sought<'a> {
     ) -> Self {
         let (planes, pose) = (&places.adjusted.shared_planes, poses[station]);
         let of_others = |plane: usize| planes[plane].tiles.numbers().any(by_others);
-        let wide = places.wide.within(&places.around(station, &pose), of_others);
+        let wide = places.wide.only(of_others);
         let mut points = places.points[station].clone();
         let gate = Gate { slack_m: 0.0, stride: 1, parameters: 0 };
         let sighting = Sighting::new(&points, &pose, planes, gate);

@@ -1,7 +1,6 @@
 //! Where the patches of two stations meet, and what each pair in contact observes.
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
-use rigid_pose::InputError;
 
 use crate::error::Result;
 use crate::surfaces::patches::Surface;
@@ -54,9 +53,6 @@ pub(crate) fn partners(
     let mut found = Vec::new();
     for (index, patch) in asking.patches.iter().enumerate() {
         let centre = rotation * patch.centre.coords + to_asked.translation.vector;
-        if !rigid_pose::is_usable(&centre.into()) {
-            return Err(InputError::NonFinite { what: "points of a station in the frame of another", index }.into());
-        }
         if !asked.extent.is_near(&centre, farthest_m) {
             continue;
         }

@@ -21,8 +21,6 @@ const ROUNDS: usize = 8;
 const SMALL_STEP: f64 = 100.0;
 /// Fewest patches, or tiles, in which two stations must meet to be held together: a few meet by chance anywhere.
 pub(crate) const FEWEST_CONTACTS: usize = 15;
-/// Nearest patches that are looked at while stations are still apart.
-const CANDIDATES: usize = 8;
 
 /// Derivatives of the patches of each station by all parameters, patch by patch.
 pub(crate) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
@@ -124,22 +122,18 @@ pub(crate) fn meet(
     poses: &[Isometry3<f64>],
     only: &[(usize, usize)],
     reach: Reach,
-) -> Result<Vec<PairContacts>> {
-    let found: Result<Vec<PairContacts>> = only
-        .par_iter()
-        .map(|&(target, source)| {
-            let pose = poses[target].inverse() * poses[source];
-            let (from, to) = (surfaces[source], surfaces[target]);
-            let forward = partners(from, to, &pose, reach)?;
-            let back = partners(to, from, &pose.inverse(), reach)?;
-            let back = back.into_iter().map(|(target, source)| (source, target));
-            let contacts = forward.into_iter().chain(back).map(|(source, target)| Contact { source, target });
-            Ok(PairContacts { target, source, contacts: contacts.collect() })
-        })
-        .collect();
-    let mut pairs_in_contact = found?;
+) -> Vec<PairContacts> {
+    let contacts = |&(target, source): &(usize, usize)| {
+        let pose = poses[target].inverse() * poses[source];
+        let (from, to) = (surfaces[source], surfaces[target]);
+        let forward = partners(from, to, &pose, reach).into_iter();
+        let back = partners(to, from, &pose.inverse(), reach).into_iter().map(|(target, source)| (source, target));
+        let contacts = forward.chain(back).map(|(source, target)| Contact { source, target });
+        PairContacts { target, source, contacts: contacts.collect() }
+    };
+    let mut pairs_in_contact: Vec<PairContacts> = only.par_iter().map(contacts).collect();
     pairs_in_contact.retain(|pair_contacts| pair_contacts.contacts.len() >= 2 * FEWEST_CONTACTS);
-    Ok(pairs_in_contact)
+    pairs_in_contact
 }
 
 /// Standard deviation of the whitened residuals of all contacts, from their median.
@@ -172,11 +166,11 @@ impl WideRounds<'_> {
         let mut levels = Vec::new();
         let mut across_m = self.reach_m;
         while across_m > 1.2 * size_m {
-            levels.push(Reach { across_m, candidates: CANDIDATES, cosine: TURNED });
+            levels.push(Reach { across_m, cosine: TURNED });
             across_m /= 2.0;
         }
-        levels.push(Reach { across_m: size_m, candidates: CANDIDATES, cosine: SAME_DIRECTION });
-        levels.push(Reach { across_m: size_m / 2.0, candidates: 1, cosine: SAME_DIRECTION });
+        levels.push(Reach { across_m: size_m, cosine: SAME_DIRECTION });
+        levels.push(Reach { across_m: size_m / 2.0, cosine: SAME_DIRECTION });
         levels
     }
 
@@ -211,7 +205,7 @@ impl WideRounds<'_> {
                 if in_level == 0 {
                     pairs = near_each_other(&scene.surfaces, &state.poses, reach)?;
                 }
-                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach)?;
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach);
                 if in_level == 0 {
                     // Stations that do not meet now will not after the small steps of one level.
                     pairs = pairs_in_contact

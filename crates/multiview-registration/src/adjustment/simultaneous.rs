@@ -119,8 +119,6 @@ pub(crate) struct Finish<'a> {
     pub near: Known,
     /// Movement at which the rounds end, metre.
     pub tolerance_m: f64,
-    /// Rounds after which they end all the same.
-    pub most_rounds: usize,
     pub progress: &'a (dyn Fn(usize) + Sync),
     /// What is known of many stations beside what surfaces tell.
     pub joints: Vec<RelativePose>,
@@ -142,10 +140,10 @@ impl Finish<'_> {
             let scene = surfaces.scene(0);
             let off_m = OFF.get(round).map(|off| off * size_m);
             if let Some(off_m) = off_m {
-                let reach = Reach { across_m: size_m / 4.0, candidates: 1, cosine: SAME_DIRECTION };
+                let reach = Reach { across_m: size_m / 4.0, cosine: SAME_DIRECTION };
                 let near = near_each_other(&scene.surfaces, &state.poses, reach)?;
                 pairs_tried = near.len();
-                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &near, reach)?;
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &near, reach);
                 known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m)?;
             }
             let first = round == 0;
@@ -156,7 +154,7 @@ impl Finish<'_> {
             round += 1;
             (self.progress)(round);
             let settled = off_m.is_none() && self.settles(&state, &adjusted);
-            if settled || round >= self.most_rounds {
+            if settled || round >= MOST_ROUNDS {
                 let common = Common::new(state.poses.len(), &adjusted.means);
                 let factor = adjusted.factor_of_tiles();
                 return Ok(Adjusted { factor, rounds: round, settled, common, pairs_tried, ..adjusted });

@@ -3,13 +3,12 @@
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion};
 use rigid_pose::InputError;
 
+use crate::adjustment::known::SIGMAS;
 use crate::error::{Error, Result};
 use crate::relative_pose::{RelativePose, Rows};
 
 /// Angle, radian, by which a pose that features propose may differ from what was measured: voxels leave some degrees.
 const COARSE_RAD: f64 = 0.15;
-/// Standard deviations of the measured turn by which it may differ.
-const SIGMAS: f64 = 5.0;
 
 /// How the camera turned between two stations, as an inertial unit measures it.
 #[derive(Debug, Clone, Copy, PartialEq)]

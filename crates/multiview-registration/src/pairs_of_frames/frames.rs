@@ -19,14 +19,10 @@ use rigid_pose::InputError;
 /// By how much surfaces may stand apart at start poses, share of the depth: poses that err by 5 cm and 2 degrees an axis move them by some
 /// 0.05 against each other at 2 m. Larger ones only try more pairs.
 const START_ERROR: f32 = 0.15;
-/// Share of a frame that another must be expected to see at start poses: their errors hide half of what two frames share.
-const START_OVERLAP: f64 = 0.15;
 /// Pairs of a frame that are tried, those with the most overlap.
 const PARTNERS: usize = 6;
-/// Frames after each that it is tried with where the order is known.
-const FOLLOWING: usize = 2;
-/// Placed frames, the nearest in order, that a frame is sought from without a guess.
-const SOUGHT: usize = 3;
+/// Where the order is known, frames after each that it is tried with, and placed ones, the nearest, that it is sought from without a guess.
+const NEAREST: usize = 2;
 /// Rounds in which the graph tells further pairs, and in which pairs that do not fit it go and those that fit again come back: two
 /// were enough on all frames tried.
 pub(crate) const ROUNDS: usize = 4;
@@ -210,10 +206,13 @@ impl<'a> Survey<'a> {
     /// Pairs that the start tells.
     fn first(&self) -> Vec<Candidate> {
         match self.start {
-            Start::Poses(poses) => self
-                .overlapping((START_ERROR, START_OVERLAP), Guess::Around, |a, b| Some(poses[a].inverse() * poses[b])),
+            Start::Poses(poses) => {
+                // Their errors hide up to half of what two frames share.
+                let near = (START_ERROR, Agreement::LEAST_OVERLAP / 2.0);
+                self.overlapping(near, Guess::Around, |a, b| Some(poses[a].inverse() * poses[b]))
+            }
             _ => (0..self.count())
-                .flat_map(|target| (1..=FOLLOWING).map(move |step| (target, target + step)))
+                .flat_map(|target| (1..=NEAREST).map(move |step| (target, target + step)))
                 .filter(|(_, source)| *source < self.count())
                 .map(|(target, source)| Candidate { target, source, guess: Guess::Around(Isometry3::identity()) })
                 .collect(),
@@ -259,7 +258,7 @@ impl<'a> Survey<'a> {
             let mut placed: Vec<usize> = graph.members.iter().copied().filter(|other| *other != frame).collect();
             placed.sort_by_key(|other| (other.abs_diff(frame), *other));
             if self.start != Start::Nothing {
-                placed.truncate(SOUGHT);
+                placed.truncate(NEAREST);
             }
             let pairs = placed.into_iter().map(|other| (frame.min(other), frame.max(other)));
             let pairs = pairs.filter(|pair| !self.tried.contains(pair));

@@ -11,10 +11,11 @@ use rayon::prelude::*;
 use rigid_pose::{eigen6, step_pose};
 
 use crate::adjustment::joint_covariance::JointCovariance;
+use crate::adjustment::known::SIGMAS;
 use crate::agreement::loops::reached;
 use crate::error::Result;
 use crate::places::search::{LOOSE, Places, move_by, pairs};
-use crate::places::sought::{AGAINST_IT, SIGMAS};
+use crate::places::sought::AGAINST_IT;
 use crate::planes::shared_planes::root;
 use crate::relative_pose::{RelativePose, Rows};
 

@@ -15,13 +15,12 @@ use crate::adjustment::rounds::FEWEST_CONTACTS;
 use crate::adjustment::simultaneous::Adjusted;
 use crate::error::Result;
 use crate::places::sought::Sought;
+use crate::planes::elimination::FEWEST_POINTS;
 use crate::planes::sightings::{APART, Gate, NOWHERE, Sighting, Wide, members};
 use crate::planes::sums::Sums;
 use crate::relative_pose::RelativePose;
 use crate::surfaces::points::StationPoints;
 
-/// Points of a station that make a tile one that it saw.
-const FEWEST_POINTS: usize = 5;
 /// Of so many points that lie on planes one is held against the rays of others.
 const STRIDE: usize = 8;
 /// Deviation of a relative pose beyond which two stations do not hold each other, patches: shared planes are joined within as much.

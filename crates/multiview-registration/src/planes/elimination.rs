@@ -16,9 +16,9 @@ use crate::planes::sums::{Sums, TileSums};
 /// How well the slopes of a shared plane are known from the patches that it was found by, radian.
 const SLOPE: f64 = 0.02;
 
-/// Fewest points of a station on tiles of a shared plane that others saw too by which it takes part there: one or two are gross errors, or
-/// lie on something beside the plane, and would hold a whole building where nothing else does.
-const FEWEST_COMMON: usize = 5;
+/// Fewest points of a station by which it saw a tile, or takes part in a shared plane by tiles that others saw too: one or two are gross
+/// errors, or lie on something beside the plane, and would hold a whole building where nothing else does.
+pub(crate) const FEWEST_POINTS: usize = 5;
 
 /// Variances beyond the noise of points, metre².
 #[derive(Debug, Clone, Copy, Default)]
@@ -104,7 +104,7 @@ impl<'a> SharedPlaneSums<'a> {
         let stations: Vec<usize> = stations
             .iter()
             .zip(common)
-            .filter(|(_, points)| *points >= FEWEST_COMMON)
+            .filter(|(_, points)| *points >= FEWEST_POINTS)
             .map(|(station, _)| *station)
             .collect();
         if stations.len() < 2 {

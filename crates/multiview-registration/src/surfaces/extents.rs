@@ -2,9 +2,6 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// Share by which a distance may be off by rounding.
-const ROUNDING: f64 = 1e-9;
-
 /// An axis-parallel box, metre; of nothing, it lies nowhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extent {
@@ -47,10 +44,7 @@ impl Extent {
             return false;
         }
         let apart = |k: usize| (self.low[k] - other.high[k]).max(other.low[k] - self.high[k]).max(0.0);
-        let size = |k: usize| self.low[k].abs().max(self.high[k].abs());
-        let slack_m = ROUNDING * (reach_m + size(0) + size(1) + size(2));
-        let square: f64 = (0..3).map(|k| apart(k).powi(2)).sum();
-        square <= (reach_m + slack_m).powi(2)
+        (0..3).map(|k| apart(k).powi(2)).sum::<f64>() <= reach_m.powi(2)
     }
 
     /// The pairs of boxes that may hold things nearer than this to each other: the smaller index first, ascending.

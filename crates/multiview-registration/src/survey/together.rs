@@ -25,8 +25,6 @@ use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 
 /// How often those of many stations that fit better elsewhere are put there.
 const AGAIN: usize = 4;
-/// Rounds after which that is looked at: all but those settle in five to seven.
-const FEW_ROUNDS: usize = 8;
 /// Default of the error of approximate poses, in radii of the clouds.
 const START_ERROR: f64 = 0.2;
 /// The rounds end when no station moves by more than a patch over this: some hundredths of a millimetre.
@@ -85,7 +83,6 @@ pub(crate) fn brought_together<'a>(
         network: &network,
         near: Known::at(patch_m / 2.0, radius_m),
         tolerance_m: patch_m / TOLERANCE,
-        most_rounds: if whole { MOST_ROUNDS } else { FEW_ROUNDS },
         progress: &total,
         joints: Vec::new(),
     };
@@ -161,7 +158,6 @@ impl Again<'_> {
             let mut state = State { poses, ..adjusted.state.clone() };
             let fixed = finish.network.fixed;
             framed(&mut state, fixed, &adjusted.state.poses[fixed]);
-            finish.most_rounds = if moved.is_empty() && !is_new { MOST_ROUNDS } else { FEW_ROUNDS };
             adjusted = finish.run(modelled, points, state)?;
             last = Some(moved);
         }

@@ -243,7 +243,7 @@ impl<'a> Survey<'a> {
             for source in target + 1..self.count() {
                 let Some(pose) = pose(target, source) else { continue };
                 let fraction = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4, error);
-                found.push(Overlap { target, source, fraction });
+                found.push(Overlap { source, target, fraction });
             }
         }
         let chosen = best_partners(&found, self.count(), least, PARTNERS).into_iter();

@@ -9,10 +9,13 @@ use crate::planes::contacts::Contact;
 use crate::planes::reduction::PairContacts;
 use crate::planes::tiles::Tiles;
 use crate::surfaces::extents::Extent;
-use crate::surfaces::patches::{REACH, Surface, axes};
+use crate::surfaces::patches::{Surface, axes};
 use crate::surfaces::plane_fit::{Moments, SAME_DIRECTION};
 use crate::surfaces::regions::{OFF_PLANE, ROUGHER};
 use point_cloud::NeighbourTree;
+
+/// How far patches of neighbouring pieces of a plane may be apart, patches.
+const BESIDE: f64 = 2.0;
 
 /// A plane with what is known of its extent.
 #[derive(Debug, Clone)]
@@ -143,7 +146,7 @@ impl<'a> Joined<'a> {
                 }
             }
         }
-        let reach_m = REACH * self.size_m();
+        let reach_m = BESIDE * self.size_m();
         let piece = |(root, centres)| Ok((root, Piece::new(centres)?));
         let pieces: Vec<(usize, Piece)> = centres.into_iter().map(piece).collect::<Result<_>>()?;
         let extents: Vec<Extent> = pieces.iter().map(|(_, piece)| piece.extent).collect();

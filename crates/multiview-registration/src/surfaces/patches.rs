@@ -18,12 +18,12 @@ use crate::surfaces::regions::{Patches, Region};
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
 
-/// Fewest points of a patch: those whose scatter about a plane says something.
+/// Fewest points of a patch, or tiles of a shared plane: those whose scatter about a plane says something.
 pub(crate) const FEWEST_POINTS: usize = 6;
 /// Neighbouring patches that may belong to the same plane: those around one in a grid, and some more.
 const NEIGHBOURS: usize = 13;
-/// Reach of the neighbourhood, and how far pieces of a plane may be apart, in patches.
-pub(crate) const REACH: f64 = 1.8;
+/// Reach of the neighbourhood, in patches.
+const REACH: f64 = 1.8;
 /// Points farther from their patch than this multiple of the median distance are left out of it.
 const GROSS: f64 = 5.0;
 /// The same for the angle (its sine) between the normals of point and patch, and an angle that is always allowed.

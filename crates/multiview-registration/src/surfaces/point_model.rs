@@ -77,13 +77,11 @@ pub(crate) fn checked_prior(model: &dyn PointModel) -> Result<Prior> {
     Ok((values, sigma))
 }
 
+/// Points, with their derivatives by all parameters, point by point.
+pub(crate) type Evaluated = (Vec<Point3<f64>>, Vec<[f64; 3]>);
+
 /// All points of a station at these parameters, with the derivatives of each (one entry a parameter).
-pub(crate) fn evaluated(
-    model: &dyn PointModel,
-    station: usize,
-    count: usize,
-    parameters: &[f64],
-) -> Result<(Vec<Point3<f64>>, Vec<[f64; 3]>)> {
+pub(crate) fn evaluated(model: &dyn PointModel, station: usize, count: usize, parameters: &[f64]) -> Result<Evaluated> {
     let m = parameters.len();
     let mut derivatives = vec![[0.0; 3]; count * m];
     let point = |index: usize| {

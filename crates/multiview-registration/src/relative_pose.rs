@@ -1,9 +1,22 @@
 //! The relative pose of two stations as an observation.
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Dyn, Isometry3, Matrix6, OMatrix, U6, Vector6};
 
 use crate::error::Result;
 use rigid_pose::{InputError, inverse_left_jacobian, is_finite, pose_difference, relative_jacobians, require_length};
+
+/// Rows of some observations by the pose of a station.
+pub(super) type Rows = OMatrix<f64, Dyn, U6>;
+
+/// A relative pose of two stations that is observed along some motions.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RelativePose {
+    pub stations: [usize; 2],
+    /// The second in the frame of the first.
+    pub first_from_second: Isometry3<f64>,
+    /// The motions, by the tangent of that pose, each over its standard deviation.
+    pub rows: Rows,
+}
 
 /// The residual of a relative pose, and the Jacobians of the model by target and source.
 pub(super) fn relative_pose_parts(

@@ -8,7 +8,7 @@ use std::num::NonZeroUsize;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::Point3;
-use rigid_pose::{InputError, require_option, require_points};
+use rigid_pose::{InputError, require_points};
 
 use crate::coincident::Places;
 use crate::error::{Error, Result};
@@ -64,16 +64,12 @@ impl NeighbourTree {
     /// [`InputError::NonFinite`] for a query that is not finite.
     pub fn nearest(&self, query: &Point3<f64>) -> Result<Neighbour> {
         let query = checked(query)?;
-        Ok(self.nearest_unchecked(&query))
-    }
-
-    /// The nearest point not farther than `radius_m`, if there is one.
-    ///
-    /// # Errors
-    /// [`InputError::NonFinite`] for a query that is not finite.
-    pub fn nearest_within(&self, query: &Point3<f64>, radius_m: f64) -> Result<Option<Neighbour>> {
-        let nearest = self.nearest(query)?;
-        Ok((nearest.distance_m <= radius_m).then_some(nearest))
+        let best = self.tree.query(&query).nearest_one::<SquaredEuclidean<f64>>().execute();
+        // A second, tiny query: whatever lies on the sphere through the best point.
+        let mut index = self.places.first(best.item);
+        let on_sphere = self.tree.query(&query).within::<SquaredEuclidean<f64>>(best.distance).unsorted();
+        on_sphere.visit(|item| index = index.min(self.places.first(item.item)));
+        Ok(neighbour(index, best.distance))
     }
 
     /// The `count` nearest points in the order of distance, then index (fewer where the tree holds fewer).
@@ -91,27 +87,8 @@ impl NeighbourTree {
             .iter()
             .flat_map(|item| self.places.points(item.item).take(count.get()).map(|k| neighbour(k, item.distance)))
             .collect();
-        sort(&mut found);
+        found.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m).then(a.index.cmp(&b.index)));
         found.truncate(count.get());
-        Ok(found)
-    }
-
-    /// All points not farther than `radius_m` in the order of distance, then index.
-    ///
-    /// # Errors
-    /// [`InputError::NonFinite`] for a query that is not finite, [`InputError::InvalidOption`] for a negative or NaN radius.
-    pub fn within(&self, query: &Point3<f64>, radius_m: f64) -> Result<Vec<Neighbour>> {
-        let query = checked(query)?;
-        require_option("radius_m", radius_m, "0 or more and finite", |r| r >= 0.0 && (r * r).is_finite())?;
-        let mut found: Vec<Neighbour> = self
-            .tree
-            .query(&query)
-            .within::<SquaredEuclidean<f64>>(radius_m * radius_m)
-            .execute()
-            .iter()
-            .flat_map(|item| self.places.points(item.item).map(|k| neighbour(k, item.distance)))
-            .collect();
-        sort(&mut found);
         Ok(found)
     }
 
@@ -138,23 +115,10 @@ impl NeighbourTree {
         let second_m = found.get(1).map_or(reach_m, |item| item.distance.sqrt());
         Some((neighbour(self.places.first(nearest.item), nearest.distance), second_m))
     }
-
-    fn nearest_unchecked(&self, query: &[f64; 3]) -> Neighbour {
-        let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
-        // A second, tiny query: whatever lies on the sphere through the best point.
-        let mut index = self.places.first(best.item);
-        let on_sphere = self.tree.query(query).within::<SquaredEuclidean<f64>>(best.distance).unsorted();
-        on_sphere.visit(|item| index = index.min(self.places.first(item.item)));
-        neighbour(index, best.distance)
-    }
 }
 
 fn neighbour(index: usize, square: f64) -> Neighbour {
     Neighbour { index, distance_m: square.sqrt() }
-}
-
-fn sort(found: &mut [Neighbour]) {
-    found.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m).then(a.index.cmp(&b.index)));
 }
 
 fn checked(query: &Point3<f64>) -> Result<[f64; 3]> {

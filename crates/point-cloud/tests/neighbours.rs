@@ -20,21 +20,17 @@ fn all_by_distance(points: &[Point3<f64>], query: &Point3<f64>) -> Vec<(f64, usi
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn agrees_with_a_search_through_all(points in lattice_points(), q in prop::array::uniform3(-1i8..8), radius in 0.0..4.0_f64) {
+    fn agrees_with_a_search_through_all(points in lattice_points(), q in prop::array::uniform3(-1i8..8)) {
         let query = Point3::from(q.map(f64::from));
         let tree = NeighbourTree::new(&points).unwrap();
         let all = all_by_distance(&points, &query);
         let nearest = tree.nearest(&query).unwrap();
         prop_assert_eq!((nearest.distance_m, nearest.index), all[0]);
-        let near: Vec<usize> = tree.within(&query, radius).unwrap().iter().map(|n| n.index).collect();
-        let expected: Vec<usize> = all.iter().filter(|(d, _)| *d * *d <= radius * radius).map(|(_, i)| *i).collect();
-        prop_assert_eq!(near, expected);
         let k = tree.k_nearest(&query, 7).unwrap();
         prop_assert_eq!(k.len(), points.len().min(7));
         for (found, (distance, _)) in k.iter().zip(&all) {
             prop_assert!((found.distance_m - distance).abs() < 1e-15);
         }
-        prop_assert_eq!(tree.nearest_within(&query, radius).unwrap().is_some(), all[0].0 <= radius);
     }
 }
 
@@ -48,15 +44,13 @@ fn what_the_tree_would_answer_wrongly_is_refused() {
     let tree = NeighbourTree::new(&[Point3::origin()]).unwrap();
     assert_eq!((tree.len(), tree.is_empty()), (1, false));
     let nan = Point3::new(f64::NAN, 0.0, 0.0);
-    assert!(tree.nearest(&nan).is_err() && tree.k_nearest(&nan, 1).is_err() && tree.within(&nan, 1.0).is_err());
-    assert!(tree.within(&Point3::origin(), -1.0).is_err() && tree.within(&Point3::origin(), f64::NAN).is_err());
+    assert!(tree.nearest(&nan).is_err() && tree.k_nearest(&nan, 1).is_err());
     assert!(tree.k_nearest(&Point3::origin(), 0).unwrap().is_empty());
-    assert!(tree.nearest_within(&Point3::new(2.0, 0.0, 0.0), f64::NAN).unwrap().is_none());
 }
 
 #[test]
 fn a_thousand_equal_points_give_the_first() {
     let tree = NeighbourTree::new(&vec![Point3::new(1.0, 1.0, 1.0); 1000]).unwrap();
     assert_eq!(tree.nearest(&Point3::origin()).unwrap().index, 0);
-    assert_eq!(tree.within(&Point3::new(1.0, 1.0, 1.0), 0.0).unwrap().len(), 1000);
+    assert_eq!(tree.k_nearest(&Point3::new(1.0, 1.0, 1.0), 2000).unwrap().len(), 1000);
 }

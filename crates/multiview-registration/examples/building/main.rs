@@ -137,12 +137,11 @@ fn report(found: &StationRegistration, truth: &[Isometry3<f64>], begin: usize) {
         at(1.0)
     );
     println!(
-        "  {} pairs of stations tried, {} blocks filled; {} pairs of surfaces, {} pairs alone, {} refused, {} loops; {} rounds{}; undetermined {}, doubtful {:?}",
+        "  {} pairs of stations tried, {} blocks filled; {} pairs of surfaces, {} pairs alone, {} loops; {} rounds{}; undetermined {}, doubtful {:?}",
         found.effort.pairs_tried,
         found.effort.filled_blocks,
         found.surfaces.len(),
         found.pairs.len(),
-        found.refused.len(),
         found.loops.len(),
         found.rounds,
         if found.settled { "" } else { " (not settled)" },

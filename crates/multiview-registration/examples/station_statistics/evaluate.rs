@@ -80,11 +80,10 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
                     let (station, sigma_mm) = least_known(&found);
                     let worst = found.loops.iter().map(|l| l.translation_m * 1e3).fold(0.0, f64::max);
                     println!(
-                        "  {label:>22}: {mm:6.2} mm {degrees:.4} deg; {} pairs, {} refused, {} in the adjustment, \
+                        "  {label:>22}: {mm:6.2} mm {degrees:.4} deg; {} pairs, {} in the adjustment, \
                          {} loops (worst {worst:.1} mm), sigma0 {:.2}, {} rounds{}, undetermined {}, doubtful {:?} \
                          (contradicted at most {:.1} times as usual); station {station} known to {sigma_mm:.2} mm",
                         found.pairs.len(),
-                        found.refused.len(),
                         found.surfaces.len(),
                         found.loops.len(),
                         found.sigma0.unwrap_or(f64::NAN),

@@ -3,7 +3,7 @@
 //! A plane that a few stations saw is eliminated, and couples them with each other. One that very many saw, as the floor of a
 //! building, stays beside them: eliminated, it would fill the whole matrix.
 
-use nalgebra::{Const, DMatrix, DVector, Dyn, Isometry3, Matrix3, Matrix6, Matrix6x3, OMatrix, U6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, Matrix6x3};
 use rigid_pose::{InputError, pose_difference};
 use sparse_matrices::BlockMatrix;
 
@@ -11,16 +11,14 @@ use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::known::Known;
 use crate::adjustment::turns::MeasuredTurn;
 use crate::error::Result;
-use crate::planes::elimination::{Eliminated, Products, WideProducts, motion_of};
+use crate::planes::elimination::{Eliminated, Products, motion_of};
 use crate::planes::shared_planes::SharedPlane;
+use crate::relative_pose::{RelativePose, relative_pose_parts};
 use crate::surfaces::point_model::Prior;
 
 /// Stations that saw a plane beyond which it stays beside them. Those of one room see its walls from so many stations; with 12 or
 /// 48 the work is the same within a tenth.
 pub(crate) const MOST_ELIMINATED: usize = 24;
-
-/// Rows of some observations by the pose of a station.
-pub(crate) type Rows = OMatrix<f64, Dyn, U6>;
 
 /// Normal equations: six unknowns a station, the shared parameters, then three for each plane that stays.
 pub(crate) struct Equations {
@@ -59,7 +57,19 @@ impl Equations {
                 }
                 self.add_shared(eliminated, products, &motions);
             }
-            Products::Beside(wide) => self.add_wide(&eliminated.stations, &motions, wide),
+            Products::Beside(pairs, of_plane) => {
+                for (&pair, products) in pairs {
+                    self.add_pair(&eliminated.stations, &motions, pair, products);
+                }
+                let plane = self.next;
+                self.next += 1;
+                for (k, (&station, motion)) in eliminated.stations.iter().zip(&motions).enumerate() {
+                    let block = eliminated.from_motions.fixed_view::<3, 3>(0, 3 * k) * motion.transpose();
+                    self.normal.add(plane, station, |i, j| -block[(i, j)]);
+                }
+                self.normal.add(plane, plane, |i, j| 0.5 * (of_plane[(i, j)] + of_plane[(j, i)]));
+                self.add_right(plane, (-eliminated.from_distances).as_slice());
+            }
         }
     }
 
@@ -94,43 +104,31 @@ impl Equations {
         self.add_right(self.stations, &eliminated.right.as_slice()[first..]);
     }
 
-    fn add_wide(&mut self, stations: &[usize], motions: &[Matrix6x3<f64>], wide: &WideProducts) {
-        for (&pair, products) in &wide.pairs {
-            self.add_pair(stations, motions, pair, products);
-        }
-        let plane = self.next;
-        self.next += 1;
-        for (k, (&station, motion)) in stations.iter().zip(motions).enumerate() {
-            let block = wide.with_plane.fixed_view::<3, 3>(0, 3 * k) * motion.transpose();
-            self.normal.add(plane, station, |i, j| block[(i, j)]);
-        }
-        self.normal.add(plane, plane, |i, j| 0.5 * (wide.of_plane[(i, j)] + wide.of_plane[(j, i)]));
-        self.add_right(plane, wide.right.as_slice());
-    }
-
-    /// Adds rows that two stations, and the shared parameters where some are given, take part in, with what is left of them.
-    pub(crate) fn add_rows(
+    /// Adds a relative pose. Along its rows the motion from there, and what shared parameters do where some are given, leaves `right`.
+    pub(crate) fn add_relative_pose(
         &mut self,
-        stations: [usize; 2],
-        rows: [&Rows; 2],
+        RelativePose { stations, first_from_second, rows }: &RelativePose,
         shared: Option<&DMatrix<f64>>,
-        residual: &DVector<f64>,
+        right: &DVector<f64>,
+        poses: &[Isometry3<f64>],
     ) {
-        for (n, (own, station)) in rows.iter().zip(stations).enumerate() {
-            for (other_rows, other) in rows.iter().zip(stations).take(n + 1) {
-                let block: Matrix6<f64> = own.transpose() * *other_rows;
+        let (v, by) = relative_pose_parts(first_from_second, &poses[stations[0]], &poses[stations[1]]);
+        let (residual, by) = (right - rows * v, by.map(|by| rows * by));
+        for (n, (own, &station)) in by.iter().zip(stations).enumerate() {
+            for (other_rows, &other) in by.iter().zip(stations).take(n + 1) {
+                let block: Matrix6<f64> = own.transpose() * other_rows;
                 self.normal.add(station, other, |i, j| block[(i, j)]);
             }
-            self.add_right(station, (own.transpose() * residual).as_slice());
+            self.add_right(station, (own.transpose() * &residual).as_slice());
             if let Some(shared) = shared {
-                let block = shared.transpose() * *own;
+                let block = shared.transpose() * own;
                 self.normal.add(self.stations, station, |i, j| block[(i, j)]);
             }
         }
         if let Some(shared) = shared {
             let block = shared.transpose() * shared;
             self.normal.add(self.stations, self.stations, |i, j| block[(i, j)]);
-            self.add_right(self.stations, (shared.transpose() * residual).as_slice());
+            self.add_right(self.stations, (shared.transpose() * &residual).as_slice());
         }
     }
 
@@ -156,10 +154,9 @@ impl Equations {
 
     /// Adds a turn that was measured between two stations.
     pub(crate) fn add_turn(&mut self, turn: &MeasuredTurn, poses: &[Isometry3<f64>]) {
-        let Some((residual, by)) = turn.linearised(poses) else { return };
-        let [first, second] = by.map(|by| OMatrix::from_fn_generic(Dyn(3), Const::<6>, |row, k| by[(row, k)]));
-        let residual = DVector::from_column_slice(residual.as_slice());
-        self.add_rows([turn.first, turn.second], [&first, &second], None, &residual);
+        if let Some(observed) = turn.observed(poses) {
+            self.add_relative_pose(&observed, None, &DVector::zeros(3), poses);
+        }
     }
 
     /// Cofactors, with priors that hold what nothing determines.

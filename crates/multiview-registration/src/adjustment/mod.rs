@@ -3,7 +3,6 @@
 pub(crate) mod cofactors;
 pub(crate) mod equations;
 pub(crate) mod joint_covariance;
-pub(crate) mod joints;
 pub(crate) mod known;
 pub(crate) mod network;
 pub(crate) mod precision;

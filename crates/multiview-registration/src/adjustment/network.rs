@@ -7,13 +7,9 @@ use crate::adjustment::known::Known;
 use crate::adjustment::turns::MeasuredTurn;
 use crate::error::Result;
 use crate::planes::reduction::{PairContacts, Reduced};
-use crate::relative_pose::relative_pose_parts;
+use crate::relative_pose::RelativePose;
 use crate::surfaces::point_model::Prior;
 use rigid_pose::step_pose;
-
-/// Steps onto what pairs observe end below this part of the radius, or after so many: relative poses bend with large turns.
-const SMALL_STEP: f64 = 1e-6;
-const MOST_STEPS: usize = 6;
 
 /// Poses and shared parameters.
 #[derive(Debug, Clone)]
@@ -46,14 +42,14 @@ pub(crate) struct Anchors<'a> {
 }
 
 /// What does not change from round to round.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) struct Network<'a> {
     /// The station that keeps its pose.
     pub fixed: usize,
     /// How well each position is taken to be known where no contact says anything, metre; attitudes to a radian.
     pub hold_m: f64,
-    pub names: &'a [String],
-    pub prior: &'a Prior,
+    pub names: Vec<String>,
+    pub prior: Prior,
     pub turns: &'a [MeasuredTurn],
     /// Whether few stations are adjusted, or such as are not off each by itself.
     pub whole: bool,
@@ -65,40 +61,32 @@ impl Network<'_> {
         Known::at(self.hold_m, self.hold_m)
     }
 
-    /// Steps of all unknowns onto what the pairs observe.
+    /// A step of all unknowns onto what the pairs observe.
     pub(crate) fn solve(
         &self,
         state: &State,
         pairs: &[(&PairContacts, Reduced)],
         anchors: &Anchors<'_>,
     ) -> Result<State> {
-        let (mut now, parameters) = (state.clone(), state.parameters.len());
+        let (poses, parameters) = (&state.poses, state.parameters.len());
         let share = anchors.factor.max(1.0).sqrt().recip();
-        for _ in 0..MOST_STEPS {
-            let mut equations = Equations::new(now.poses.len(), anchors.fixed, parameters, 0);
-            let changed = DVector::from_fn(parameters, |k, _| now.parameters[k] - state.parameters[k]);
-            for (pair_contacts, reduced) in pairs.iter().filter(|(_, reduced)| reduced.rows.nrows() > 0) {
-                let ends = [pair_contacts.target, pair_contacts.source];
-                let (v, by) = relative_pose_parts(&reduced.pose, &now.poses[ends[0]], &now.poses[ends[1]]);
-                let rows = share * &reduced.rows;
-                let (by_pose, shared) = (rows.columns(0, 6), rows.columns(6, parameters).into_owned());
-                // The motion from where contacts were linearised is -v.
-                let residual = share * &reduced.right - by_pose * v + &shared * &changed;
-                let shared = (parameters > 0).then_some(&shared);
-                equations.add_rows(ends, [&(by_pose * by[0]), &(by_pose * by[1])], shared, &residual);
-            }
-            for turn in self.turns {
-                equations.add_turn(turn, &now.poses);
-            }
-            equations.hold(anchors.known, anchors.poses, &now.poses);
-            equations.add_prior(self.prior, &now.parameters);
-            let before = now.clone();
-            now.moved(&equations.step(&equations.cofactors(anchors.known)?));
-            if largest_step(&before, &now, self.hold_m) <= SMALL_STEP * self.hold_m {
-                break;
-            }
+        let mut equations = Equations::new(poses.len(), anchors.fixed, parameters, 0);
+        for (pair_contacts, reduced) in pairs.iter().filter(|(_, reduced)| reduced.rows.nrows() > 0) {
+            let stations = [pair_contacts.target, pair_contacts.source];
+            let rows = share * reduced.rows.fixed_columns::<6>(0);
+            let shared = share * reduced.rows.columns(6, parameters);
+            let observed = RelativePose { stations, first_from_second: reduced.pose, rows };
+            let shared = (parameters > 0).then_some(&shared);
+            equations.add_relative_pose(&observed, shared, &(share * &reduced.right), poses);
         }
-        Ok(now)
+        for turn in self.turns {
+            equations.add_turn(turn, poses);
+        }
+        equations.hold(anchors.known, anchors.poses, poses);
+        equations.add_prior(&self.prior, &state.parameters);
+        let mut next = state.clone();
+        next.moved(&equations.step(&equations.cofactors(anchors.known)?));
+        Ok(next)
     }
 }
 

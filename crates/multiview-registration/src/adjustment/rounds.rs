@@ -1,6 +1,6 @@
 //! The wide rounds: contacts of patches found anew, all pairs reduced, all stations moved.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 use rigid_pose::InputError;
 use statistics::mad_scale;
@@ -10,10 +10,10 @@ use crate::adjustment::network::{Anchors, Network, State, largest_step};
 use crate::error::Result;
 use crate::planes::contacts::{Contact, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, reduce};
-use crate::surfaces::extents::{Extent, Extents};
+use crate::surfaces::extents::Extent;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
-use crate::surfaces::point_model::PointModel;
+use crate::surfaces::point_model::{PointModel, evaluated};
 use crate::surfaces::points::StationPoints;
 
 /// Most rounds of a level, and the part of its limit that a step must be below for it to end.
@@ -21,8 +21,6 @@ const ROUNDS: usize = 8;
 const SMALL_STEP: f64 = 100.0;
 /// Fewest patches, or tiles, in which two stations must meet to be held together: a few meet by chance anywhere.
 pub(crate) const FEWEST_CONTACTS: usize = 15;
-/// Nearest patches that are looked at while stations are still apart.
-const CANDIDATES: usize = 8;
 
 /// Derivatives of the patches of each station by all parameters, patch by patch.
 pub(crate) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
@@ -77,18 +75,9 @@ fn at_parameters(
     count: usize,
     parameters: &[f64],
 ) -> Result<(Surface, Vec<[f64; 3]>)> {
-    let m = parameters.len();
-    let mut points = vec![Point3::origin(); count];
-    let mut of_points = vec![[0.0; 3]; count * m];
-    for index in surface.members.iter().map(|&index| index as usize) {
-        points[index] = model.point(station, index, parameters, Some(&mut of_points[index * m..(index + 1) * m]));
-    }
-    rigid_pose::require_points("points of the point model", &points)?;
-    if let Some(index) = of_points.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
-        return Err(InputError::NonFinite { what: "derivatives of the point model", index }.into());
-    }
+    let (points, of_points) = evaluated(model, station, count, parameters)?;
     let surface = surface.refitted(&points)?;
-    let derivatives = averaged(&surface, &of_points, m);
+    let derivatives = averaged(&surface, &of_points, parameters.len());
     Ok((surface, derivatives))
 }
 
@@ -124,7 +113,7 @@ pub(crate) fn near_each_other(
         Ok(Extent::placed(centres, pose))
     };
     let extents = surfaces.iter().zip(poses).map(extent).collect::<Result<Vec<Extent>>>()?;
-    Ok(Extents::new(&extents).pairs(reach.farthest_m(size_m)))
+    Ok(Extent::pairs(&extents, reach.farthest_m(size_m)))
 }
 
 /// All pairs in contact at these poses; `only`: the pairs to look at (target, source).
@@ -133,48 +122,18 @@ pub(crate) fn meet(
     poses: &[Isometry3<f64>],
     only: &[(usize, usize)],
     reach: Reach,
-) -> Result<Vec<PairContacts>> {
-    let found: Result<Vec<PairContacts>> = only
-        .par_iter()
-        .map(|&(target, source)| {
-            let pose = poses[target].inverse() * poses[source];
-            let (from, to) = (surfaces[source], surfaces[target]);
-            let forward = partners(from, to, &pose, reach)?;
-            let back = partners(to, from, &pose.inverse(), reach)?;
-            let contact = |source, target, asked_by_source| Contact { source, target, asked_by_source, share: 0.0 };
-            let contacts = forward.iter().map(|&(source, target)| contact(source, target, true));
-            let contacts = contacts.chain(back.iter().map(|&(target, source)| contact(source, target, false)));
-            Ok(PairContacts { target, source, contacts: contacts.collect() })
-        })
-        .collect();
-    let mut pairs_in_contact = found?;
+) -> Vec<PairContacts> {
+    let contacts = |&(target, source): &(usize, usize)| {
+        let pose = poses[target].inverse() * poses[source];
+        let (from, to) = (surfaces[source], surfaces[target]);
+        let forward = partners(from, to, &pose, reach).into_iter();
+        let back = partners(to, from, &pose.inverse(), reach).into_iter().map(|(target, source)| (source, target));
+        let contacts = forward.chain(back).map(|(source, target)| Contact { source, target });
+        PairContacts { target, source, contacts: contacts.collect() }
+    };
+    let mut pairs_in_contact: Vec<PairContacts> = only.par_iter().map(contacts).collect();
     pairs_in_contact.retain(|pair_contacts| pair_contacts.contacts.len() >= 2 * FEWEST_CONTACTS);
-    share(surfaces, &mut pairs_in_contact);
-    Ok(pairs_in_contact)
-}
-
-/// A patch that k − 1 other stations see as well observes k − 1 differences, each of which would count fully only if
-/// its own error entered once: with weights 1/k the squares are those about the common surface.
-fn share(surfaces: &[&Surface], pairs_in_contact: &mut [PairContacts]) {
-    let mut seen: Vec<Vec<u32>> = surfaces.iter().map(|surface| vec![1; surface.patches.len()]).collect();
-    for pair_contacts in pairs_in_contact.iter() {
-        for contact in &pair_contacts.contacts {
-            let (station, patch) = asking(pair_contacts.target, pair_contacts.source, contact);
-            seen[station][patch] += 1;
-        }
-    }
-    for pair_contacts in pairs_in_contact.iter_mut() {
-        let (target, source) = (pair_contacts.target, pair_contacts.source);
-        for contact in &mut pair_contacts.contacts {
-            let (station, patch) = asking(target, source, contact);
-            contact.share = 1.0 / f64::from(seen[station][patch]);
-        }
-    }
-}
-
-/// The station and the patch that looked for its partner.
-fn asking(target: usize, source: usize, contact: &Contact) -> (usize, usize) {
-    if contact.asked_by_source { (source, contact.source as usize) } else { (target, contact.target as usize) }
+    pairs_in_contact
 }
 
 /// Standard deviation of the whitened residuals of all contacts, from their median.
@@ -184,7 +143,7 @@ fn scale(scene: &Scene<'_>, pairs_in_contact: &[PairContacts], poses: &[Isometry
         pair_contacts
             .contacts
             .iter()
-            .map(|contact| scene.whitened_residual(pair_contacts, contact, &pose).abs())
+            .map(|&contact| scene.whitened_residual(pair_contacts, contact, &pose).abs())
             .collect()
     };
     let mut residuals: Vec<f64> = pairs_in_contact.par_iter().map(of_pair).collect::<Vec<_>>().concat();
@@ -207,11 +166,11 @@ impl WideRounds<'_> {
         let mut levels = Vec::new();
         let mut across_m = self.reach_m;
         while across_m > 1.2 * size_m {
-            levels.push(Reach { across_m, candidates: CANDIDATES, cosine: TURNED });
+            levels.push(Reach { across_m, cosine: TURNED });
             across_m /= 2.0;
         }
-        levels.push(Reach { across_m: size_m, candidates: CANDIDATES, cosine: SAME_DIRECTION });
-        levels.push(Reach { across_m: size_m / 2.0, candidates: 1, cosine: SAME_DIRECTION });
+        levels.push(Reach { across_m: size_m, cosine: SAME_DIRECTION });
+        levels.push(Reach { across_m: size_m / 2.0, cosine: SAME_DIRECTION });
         levels
     }
 
@@ -246,7 +205,7 @@ impl WideRounds<'_> {
                 if in_level == 0 {
                     pairs = near_each_other(&scene.surfaces, &state.poses, reach)?;
                 }
-                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach)?;
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach);
                 if in_level == 0 {
                     // Stations that do not meet now will not after the small steps of one level.
                     pairs = pairs_in_contact

@@ -7,11 +7,9 @@ use rayon::prelude::*;
 
 use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::equations::{Equations, MOST_ELIMINATED};
-use crate::adjustment::joints::Joint;
 use crate::adjustment::known::Known;
 use crate::adjustment::network::{Network, State, largest_step};
 use crate::adjustment::rounds::{Surfaces, meet, near_each_other};
-use crate::adjustment::wide_errors::Residuals;
 use crate::error::Result;
 use crate::planes::contacts::Reach;
 use crate::planes::elimination::{Eliminated, Products, SharedPlaneSums, Variances, motion_of};
@@ -19,6 +17,7 @@ use crate::planes::scatter::{Scatter, TileMean, between, tile_means, variances};
 use crate::planes::shared_planes::{SharedPlane, shared_planes};
 use crate::planes::sightings::{Gate, sightings};
 use crate::planes::sums::Sums;
+use crate::relative_pose::RelativePose;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::points::StationPoints;
 use rigid_pose::pose_difference;
@@ -106,28 +105,9 @@ impl Adjusted {
         (redundancy > 0).then(|| (self.scatter.squares / redundancy as f64).sqrt())
     }
 
-    /// Of many stations that factor is found once, at the end of all rounds.
-    pub(crate) fn with_factor(mut self) -> Self {
-        self.factor = self.factor_on(&self.shared_planes);
-        self
-    }
-
-    fn factor_of_tiles(&self) -> f64 {
+    /// Factor of the variances that single tiles ask for.
+    pub(crate) fn factor_of_tiles(&self) -> f64 {
         self.sigma0().map_or(1.0, |sigma0| sigma0.powi(2).max(1.0))
-    }
-
-    fn factor_on(&self, shared_planes: &[SharedPlane]) -> f64 {
-        let of_tiles = self.factor_of_tiles();
-        let residuals = Residuals {
-            shared_planes,
-            means: &self.means,
-            scatter: &self.scatter,
-            sums: &self.sums,
-            poses: &self.state.poses,
-            cofactors: &self.cofactors,
-            of_tiles,
-        };
-        residuals.factor()
     }
 }
 
@@ -139,11 +119,9 @@ pub(crate) struct Finish<'a> {
     pub near: Known,
     /// Movement at which the rounds end, metre.
     pub tolerance_m: f64,
-    /// Rounds after which they end all the same.
-    pub most_rounds: usize,
     pub progress: &'a (dyn Fn(usize) + Sync),
     /// What is known of many stations beside what surfaces tell.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<RelativePose>,
 }
 
 impl Finish<'_> {
@@ -162,47 +140,38 @@ impl Finish<'_> {
             let scene = surfaces.scene(0);
             let off_m = OFF.get(round).map(|off| off * size_m);
             if let Some(off_m) = off_m {
-                let reach = Reach { across_m: size_m / 4.0, candidates: 1, cosine: SAME_DIRECTION };
+                let reach = Reach { across_m: size_m / 4.0, cosine: SAME_DIRECTION };
                 let near = near_each_other(&scene.surfaces, &state.poses, reach)?;
                 pairs_tried = near.len();
-                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &near, reach)?;
-                known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m);
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &near, reach);
+                known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m)?;
             }
             let first = round == 0;
             let (slack_m, stride) = if first { (OFF[0] * size_m, FIRST_STRIDE) } else { (0.0, 1) };
             let gate = Gate { slack_m, stride, parameters: state.parameters.len() };
             let sums = sightings(points, &state.poses, &known, gate);
-            let before = state.clone();
-            let adjusted = self.step(&mut state, &mut known, sums)?;
+            let adjusted = self.step(&state, known, sums)?;
             round += 1;
             (self.progress)(round);
-            let settled = off_m.is_none() && self.settles(&before, &state, &adjusted, &known);
-            if settled || round >= self.most_rounds {
-                let factor = self.factor(&adjusted, &known);
+            let settled = off_m.is_none() && self.settles(&state, &adjusted);
+            if settled || round >= MOST_ROUNDS {
                 let common = Common::new(state.poses.len(), &adjusted.means);
-                let shared_planes = known;
-                return Ok(Adjusted {
-                    state,
-                    shared_planes,
-                    factor,
-                    rounds: round,
-                    settled,
-                    common,
-                    pairs_tried,
-                    ..adjusted
-                });
+                let factor = adjusted.factor_of_tiles();
+                return Ok(Adjusted { factor, rounds: round, settled, common, pairs_tried, ..adjusted });
             }
+            (state, known) = (adjusted.state, adjusted.shared_planes);
         }
     }
 
     /// Whether no station moved by more than the tolerance, or by so much of its standard deviation that further rounds tell
     /// something: along a direction that the surfaces leave open, poses drift with every change of weights.
-    fn settles(&self, before: &State, after: &State, adjusted: &Adjusted, shared_planes: &[SharedPlane]) -> bool {
+    fn settles(&self, before: &State, adjusted: &Adjusted) -> bool {
+        let Adjusted { state: after, cofactors, .. } = adjusted;
         if largest_step(before, after, self.network.hold_m) <= self.tolerance_m {
             return true;
         }
-        let factor = self.factor(adjusted, shared_planes);
-        let cofactors = &adjusted.cofactors;
+        // Of many stations the wider factor takes as long as a round; without it what is asked here is stricter.
+        let factor = if self.network.whole { adjusted.factor_of_wide_errors() } else { adjusted.factor_of_tiles() };
         let is_settled = |k: usize| {
             let step = pose_difference(&before.poses[k], &after.poses[k]);
             let own = cofactors.of(k) * factor;
@@ -213,16 +182,11 @@ impl Finish<'_> {
         (0..after.poses.len()).all(is_settled)
     }
 
-    /// Of many stations the factor takes as long as a round; without it what is asked before rounds end is stricter.
-    fn factor(&self, adjusted: &Adjusted, shared_planes: &[SharedPlane]) -> f64 {
-        if self.network.whole { adjusted.factor_on(shared_planes) } else { adjusted.factor_of_tiles() }
-    }
-
     /// What the stations saw of each tile about the planes at the present poses, and how that scatters.
-    fn scatter(&self, known: &[SharedPlane], sums: &[Sums], observers: &[Vec<usize>]) -> (Vec<Vec<TileMean>>, Scatter) {
+    fn scatter(known: &[SharedPlane], sums: &[Sums], observers: &[Vec<usize>]) -> (Vec<Vec<TileMean>>, Scatter) {
         let of_shared_plane = |(shared_plane, stations): (&SharedPlane, &Vec<usize>)| {
             let seen = SharedPlaneSums { shared_plane, sums, weights: None };
-            let eliminated = seen.eliminated(stations, Variances::default(), self.most_eliminated());
+            let eliminated = seen.eliminated(stations, Variances::default(), MOST_ELIMINATED);
             eliminated.map_or_else(Vec::new, |eliminated| tile_means(&seen, &eliminated))
         };
         let means: Vec<Vec<TileMean>> = known.par_iter().zip(observers).map(of_shared_plane).collect();
@@ -231,15 +195,15 @@ impl Finish<'_> {
     }
 
     /// One linearised step of all unknowns.
-    fn step(&self, state: &mut State, known: &mut [SharedPlane], sums: Vec<Sums>) -> Result<Adjusted> {
-        let observers = observers(known, &sums);
-        let (means, scatter) = self.scatter(known, &sums, &observers);
+    fn step(&self, state: &State, mut known: Vec<SharedPlane>, sums: Vec<Sums>) -> Result<Adjusted> {
+        let observers = observers(&known, &sums);
+        let (means, scatter) = Self::scatter(&known, &sums, &observers);
         let variances: Vec<Variances> = means.par_iter().map(|means| variances(means, scatter.shared)).collect();
         let eliminated: Vec<Option<Eliminated>> = (0..known.len())
             .into_par_iter()
             .map(|k| {
                 let seen = SharedPlaneSums { shared_plane: &known[k], sums: &sums, weights: Some(&scatter.weights) };
-                seen.eliminated(&observers[k], variances[k], self.most_eliminated())
+                seen.eliminated(&observers[k], variances[k], MOST_ELIMINATED)
             })
             .collect();
         let seen = known.iter().zip(&eliminated).filter_map(|(plane, eliminated)| Some((plane, eliminated.as_ref()?)));
@@ -250,11 +214,11 @@ impl Finish<'_> {
                 shared_plane.moved(&eliminated.plane(&motions));
             }
         }
+        let mut state = state.clone();
         state.moved(&step);
-        let state = state.clone();
         Ok(Adjusted {
             state,
-            shared_planes: Vec::new(),
+            shared_planes: known,
             sums,
             scatter,
             means,
@@ -268,11 +232,6 @@ impl Finish<'_> {
         })
     }
 
-    /// Stations beyond which a plane is not eliminated.
-    fn most_eliminated(&self) -> usize {
-        if self.network.whole { usize::MAX } else { MOST_ELIMINATED }
-    }
-
     /// The step of all unknowns, poses being held near where they are, and cofactors.
     fn solved<'s>(
         &self,
@@ -280,15 +239,15 @@ impl Finish<'_> {
         seen: impl Iterator<Item = (&'s SharedPlane, &'s Eliminated)> + Clone,
     ) -> Result<(DVector<f64>, Cofactors)> {
         let network = self.network;
-        let planes = seen.clone().filter(|(_, eliminated)| matches!(eliminated.products, Products::Beside(_))).count();
+        let planes = seen.clone().filter(|(_, eliminated)| matches!(eliminated.products, Products::Beside(..))).count();
         let mut equations = Equations::new(state.poses.len(), Some(network.fixed), state.parameters.len(), planes);
         seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
-        equations.add_prior(network.prior, &state.parameters);
+        equations.add_prior(&network.prior, &state.parameters);
         for turn in network.turns {
             equations.add_turn(turn, &state.poses);
         }
         for joint in &self.joints {
-            joint.add_to(&mut equations, &state.poses);
+            equations.add_relative_pose(joint, None, &DVector::zeros(1), &state.poses);
         }
         let step = equations.step(&equations.cofactors(self.near)?);
         Ok((step, equations.cofactors(network.held())?))

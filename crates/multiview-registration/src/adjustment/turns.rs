@@ -1,15 +1,14 @@
 //! Turns between stations that something else measures: an inertial unit.
 
-use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion};
 use rigid_pose::InputError;
 
+use crate::adjustment::known::SIGMAS;
 use crate::error::{Error, Result};
-use crate::relative_pose::relative_pose_parts;
+use crate::relative_pose::{RelativePose, Rows};
 
 /// Angle, radian, by which a pose that features propose may differ from what was measured: voxels leave some degrees.
 const COARSE_RAD: f64 = 0.15;
-/// Standard deviations of the measured turn by which it may differ.
-const SIGMAS: f64 = 5.0;
 
 /// How the camera turned between two stations, as an inertial unit measures it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,16 +47,13 @@ impl MeasuredTurn {
         self.covariance.cholesky()?.l().try_inverse().filter(|inverse| inverse.iter().all(|value| value.is_finite()))
     }
 
-    /// Whitened residual and its derivatives by the tangents of both poses.
-    pub(crate) fn linearised(&self, poses: &[Isometry3<f64>]) -> Option<(Vector3<f64>, [Matrix3x6<f64>; 2])> {
-        let (first, second) = (poses.get(self.first)?, poses.get(self.second)?);
-        // The translation is not observed.
-        let observed = Isometry3::from_parts((first.inverse() * second).translation, self.first_from_second);
-        let (v, by) = relative_pose_parts(&observed, first, second);
-        let whitening = self.whitening()?;
-        // The residual is observed minus model.
-        let rows = |by: Matrix6<f64>| -(whitening * by.fixed_rows::<3>(3));
-        Some((whitening * v.fixed_rows::<3>(3), by.map(rows)))
+    /// As a relative pose, of whose translation nothing is observed.
+    pub(crate) fn observed(&self, poses: &[Isometry3<f64>]) -> Option<RelativePose> {
+        let translation = (poses[self.first].inverse() * poses[self.second]).translation;
+        let mut rows = Rows::zeros(3);
+        rows.fixed_columns_mut::<3>(3).copy_from(&-self.whitening()?);
+        let first_from_second = Isometry3::from_parts(translation, self.first_from_second);
+        Some(RelativePose { stations: [self.first, self.second], first_from_second, rows })
     }
 }
 

@@ -5,14 +5,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DVector, Isometry3, Vector3, Vector6};
+use nalgebra::{DVector, Vector3, Vector6};
 use statistics::Distribution;
 
-use crate::adjustment::cofactors::Cofactors;
+use crate::adjustment::simultaneous::Adjusted;
 use crate::planes::elimination::motion_of;
-use crate::planes::scatter::{Scatter, TileMean};
+use crate::planes::scatter::TileMean;
 use crate::planes::shared_planes::SharedPlane;
-use crate::planes::sums::Sums;
 
 /// Sides of blocks, tiles; the last holds every shared plane.
 const SIDES: [usize; 4] = [2, 4, 8, usize::MAX];
@@ -21,19 +20,6 @@ const LEVEL: f64 = 1e-3;
 
 /// Stations of which all are looked at. Of more only so many: of each the whole factor is needed.
 const MANY: usize = 200;
-
-/// What an adjustment leaves of the tiles.
-pub(crate) struct Residuals<'a> {
-    pub shared_planes: &'a [SharedPlane],
-    pub means: &'a [Vec<TileMean>],
-    pub scatter: &'a Scatter,
-    pub sums: &'a [Sums],
-    pub poses: &'a [Isometry3<f64>],
-    /// Of the tangents of all poses and the shared parameters.
-    pub cofactors: &'a Cofactors,
-    /// Factor of the variances that single tiles ask for.
-    pub of_tiles: f64,
-}
 
 /// What a station saw of the tiles of a block off the mean of all stations.
 struct OfStation {
@@ -66,26 +52,28 @@ impl Derivatives {
 /// What the stations saw of a block, by station.
 type Block = BTreeMap<usize, OfStation>;
 
-impl Residuals<'_> {
-    /// Factor of the variances that the errors shared by tiles ask for; at least that of single tiles.
-    pub(crate) fn factor(&self) -> f64 {
-        let mut largest = self.of_tiles;
-        let one_of = (self.poses.len() / MANY).max(1);
+impl Adjusted {
+    /// Factor of the variances that the errors shared by tiles ask for; at least that of single tiles. Of many stations it takes as long
+    /// as a round, so it is found once, at the end; without it what is asked before rounds end is stricter.
+    pub(crate) fn factor_of_wide_errors(&self) -> f64 {
+        let of_tiles = self.factor_of_tiles();
+        let mut largest = of_tiles;
+        let one_of = (self.state.poses.len() / MANY).max(1);
         for side in SIDES {
             let (mut free, mut squares, mut counted) = (0.0, 0.0, 0);
-            for (shared_plane, means) in self.shared_planes.iter().zip(self.means) {
+            for (shared_plane, means) in self.shared_planes.iter().zip(&self.means) {
                 for block in self.blocks(shared_plane, means, side).values() {
                     let looked_at = block.values().filter(|_| {
                         counted += 1;
                         counted % one_of == 0
                     });
-                    let (of_block, square) = self.squares(looked_at, block.len());
+                    let (of_block, square) = self.squares(looked_at, block.len(), of_tiles);
                     free += of_block;
                     squares += square;
                 }
             }
             let distribution = Distribution::ChiSquared { dof: free };
-            if free >= 1.0 && distribution.survival(squares / self.of_tiles) < LEVEL {
+            if free >= 1.0 && distribution.survival(squares / of_tiles) < LEVEL {
                 largest = largest.max(squares / free);
             }
         }
@@ -129,7 +117,7 @@ impl Residuals<'_> {
         let mut derivatives = Derivatives::zeros(self.cofactors.parameters());
         let Some(sums) = self.sums[mean.station].at(mean.slot as usize) else { return derivatives };
         let at = Vector3::from_fn(|k, _| sums.product(k, 0) / sums.weight());
-        let of_pose = motion_of(shared_plane, &self.poses[mean.station]) * at;
+        let of_pose = motion_of(shared_plane, &self.state.poses[mean.station]) * at;
         derivatives.poses.insert(mean.station, of_pose);
         for (k, derivative) in derivatives.parameters.iter_mut().enumerate() {
             *derivative = sums.product(3 + k, 0) / sums.weight();
@@ -139,12 +127,12 @@ impl Residuals<'_> {
 
     /// Degrees of freedom and sum of squares of some of the stations of a block: of k deviations from a mean k - 1 are free, less what the
     /// adjustment takes of each by its unknowns.
-    fn squares<'b>(&self, some: impl Iterator<Item = &'b OfStation>, all: usize) -> (f64, f64) {
+    fn squares<'b>(&self, some: impl Iterator<Item = &'b OfStation>, all: usize, of_tiles: f64) -> (f64, f64) {
         let share = (all as f64 - 1.0) / all as f64;
         let (mut free, mut squares) = (0.0, 0.0);
         for of_station in some {
             let taken = self.cofactors.variance(&of_station.derivatives);
-            free += share * (1.0 - taken / (of_station.variance * self.of_tiles)).clamp(0.0, 1.0);
+            free += share * (1.0 - taken / (of_station.variance * of_tiles)).clamp(0.0, 1.0);
             squares += share * of_station.sum * of_station.sum / (of_station.variance * self.scatter.noise);
         }
         (free, squares)

@@ -1,10 +1,11 @@
-//! Loops of pairs: how they close, and which pairs are wrong.
+//! Loops of pairs: how they close, and the tree of the pairs that most of them confirm.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector6};
 
-use crate::agreement::alignments::{PairAlignment, RefusedPair};
+use crate::agreement::alignments::PairAlignment;
+use pose_graph::is_likely;
 use rigid_pose::Uncertain;
 use rigid_pose::pose_difference;
 
@@ -22,27 +23,17 @@ pub struct LoopClosure {
     pub mahalanobis: f64,
 }
 
-/// The pair as the step from station `from`: `from_from_other`, and the other station.
-fn step(pair: &PairAlignment, from: usize) -> (usize, Uncertain) {
-    let step = Uncertain { pose: pair.result.target_from_source, covariance: pair.result.covariance };
-    if pair.target == from { (pair.source, step) } else { (pair.target, step.inverse()) }
-}
+/// Which pair joins two stations, the smaller first.
+type Between = BTreeMap<(usize, usize), usize>;
 
-fn closure(pairs: &[PairAlignment], first: usize, way: &[usize]) -> LoopClosure {
-    let (mut at, mut total) = (first, Uncertain::exact(Isometry3::identity()));
-    let mut stations = vec![first];
-    for &pair in way {
-        let (next, relative) = step(&pairs[pair], at);
-        total = total.then(&relative);
-        at = next;
-        stations.push(next);
+/// How far from coming back the way through these stations is.
+fn closure(pairs: &[PairAlignment], between: &Between, stations: Vec<usize>) -> LoopClosure {
+    let mut total = Uncertain::exact(Isometry3::identity());
+    for (&from, &to) in stations.iter().zip(stations.iter().cycle().skip(1)) {
+        let pair = &pairs[between[&(from.min(to), from.max(to))]];
+        let step = Uncertain { pose: pair.result.target_from_source, covariance: pair.result.covariance };
+        total = total.then(&if pair.target == from { step } else { step.inverse() });
     }
-    stations.pop();
-    misclosure(stations, &total)
-}
-
-/// How far from coming back a way is.
-fn misclosure(stations: Vec<usize>, total: &Uncertain) -> LoopClosure {
     let v: Vector6<f64> = pose_difference(&Isometry3::identity(), &total.pose);
     let square = total.covariance.cholesky().map_or(f64::INFINITY, |factor| v.dot(&factor.solve(&v)));
     LoopClosure {
@@ -71,34 +62,13 @@ pub(crate) fn reached(pairs: &[(usize, usize)], from: usize) -> BTreeSet<usize> 
     found
 }
 
-/// All triangles, as indices of pairs.
-fn triangles(pairs: &[PairAlignment]) -> Vec<[usize; 3]> {
-    let mut found = Vec::new();
-    let mut numbers: BTreeMap<(usize, usize), usize> = BTreeMap::new();
-    let mut beside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (index, pair) in pairs.iter().enumerate() {
-        let (a, b) = (pair.target, pair.source);
-        numbers.entry((a.min(b), a.max(b))).or_insert(index);
-        for station in [a, b] {
-            beside.entry(station).or_default().push(index);
-        }
-    }
-    let between = |a: usize, b: usize| numbers.get(&(a.min(b), a.max(b))).copied();
-    for (first, ab) in pairs.iter().enumerate() {
-        let ends = [ab.target, ab.source].into_iter().filter_map(|station| beside.get(&station));
-        let later: BTreeSet<usize> = ends.flatten().copied().filter(|second| *second > first).collect();
-        for second in later {
-            let cd = &pairs[second];
-            let shared = [cd.target, cd.source].into_iter().find(|s| *s == ab.target || *s == ab.source);
-            let Some(shared) = shared else { continue };
-            let a = if ab.target == shared { ab.source } else { ab.target };
-            let b = if cd.target == shared { cd.source } else { cd.target };
-            if let Some(third) = between(a, b).filter(|third| *third > second) {
-                found.push([first, second, third]);
-            }
-        }
-    }
-    found
+/// All triangles, as stations that each two of a pair join.
+fn triangles(between: &Between) -> Vec<[usize; 3]> {
+    let third = |&(a, b): &(usize, usize)| {
+        let later = between.range((a, b + 1)..(a + 1, 0)).map(|((_, c), _)| *c);
+        later.filter(move |c| between.contains_key(&(b, *c))).map(move |c| [a, b, c])
+    };
+    between.keys().flat_map(third).collect()
 }
 
 /// What the loops say about the pairs.
@@ -106,9 +76,8 @@ fn triangles(pairs: &[PairAlignment]) -> Vec<[usize; 3]> {
 pub(crate) struct SpanningTree {
     /// The pairs of the tree, from its root outwards.
     pub tree: Vec<usize>,
-    reached_by: Vec<Option<(usize, usize)>>,
-    /// For each pair whether the others agree with it.
-    pub sound: Vec<bool>,
+    /// From which station each other is reached.
+    reached_from: Vec<Option<usize>>,
     /// Triangles, and each pair outside the tree with the tree's way between its stations.
     pub loops: Vec<LoopClosure>,
 }
@@ -116,26 +85,20 @@ pub(crate) struct SpanningTree {
 impl SpanningTree {
     /// Whether the tree leads to a station, other than its root.
     pub(crate) fn reaches(&self, station: usize) -> bool {
-        self.reached_by[station].is_some()
+        self.reached_from[station].is_some()
     }
 }
 
-/// Which pairs agree with the tree of those that most loops confirm, and how the loops close; `closes`: whether that is near
-/// enough.
-pub(crate) fn spanning_tree(
-    pairs: &[PairAlignment],
-    root: (usize, Isometry3<f64>),
-    stations: usize,
-    closes: &dyn Fn(&LoopClosure) -> bool,
-) -> SpanningTree {
+/// The tree of the pairs that most triangles confirm, each at the 99.9 % level, from a station outwards, and how all loops close.
+pub(crate) fn spanning_tree(pairs: &[PairAlignment], root: usize, stations: usize) -> SpanningTree {
+    let joined = |(k, pair): (usize, &PairAlignment)| ((pair.target.min(pair.source), pair.target.max(pair.source)), k);
+    let between: Between = pairs.iter().enumerate().map(joined).collect();
     let mut votes = vec![0_i64; pairs.len()];
     let mut loops = Vec::new();
-    for triangle in triangles(pairs) {
-        let first = pairs[triangle[0]].target;
-        let way = ordered(pairs, first, triangle);
-        let closure = closure(pairs, first, &way);
-        for pair in triangle {
-            votes[pair] += if closes(&closure) { 1 } else { -1 };
+    for [a, b, c] in triangles(&between) {
+        let closure = closure(pairs, &between, vec![a, b, c]);
+        for ends in [(a, b), (b, c), (a, c)] {
+            votes[between[&ends]] += if is_likely(closure.mahalanobis.powi(2)) { 1 } else { -1 };
         }
         loops.push(closure);
     }
@@ -145,73 +108,28 @@ pub(crate) fn spanning_tree(
         let key = |k: usize| (votes[k].signum(), pairs[k].result.degenerate.is_empty(), votes[k]);
         key(b).cmp(&key(a)).then(pairs[b].result.overlap.total_cmp(&pairs[a].result.overlap)).then(a.cmp(&b))
     });
-    let mut poses = vec![None; stations];
-    let (mut reached_by, mut tree) = (vec![None; stations], Vec::new());
-    poses[root.0] = Some(root.1);
-    while let Some(&next) =
-        order.iter().find(|&&k| poses[pairs[k].target].is_some() != poses[pairs[k].source].is_some())
-    {
-        let pair = &pairs[next];
-        let from = if poses[pair.target].is_some() { pair.target } else { pair.source };
-        let (to, relative) = step(pair, from);
-        poses[to] = poses[from].map(|pose: Isometry3<f64>| pose * relative.pose);
-        reached_by[to] = Some((from, next));
+    let (mut reached_from, mut tree) = (vec![None; stations], Vec::new());
+    let mut is_reached = vec![false; stations];
+    is_reached[root] = true;
+    while let Some(&next) = order.iter().find(|&&k| is_reached[pairs[k].target] != is_reached[pairs[k].source]) {
+        let PairAlignment { target, source, .. } = pairs[next];
+        let (from, to) = if is_reached[target] { (target, source) } else { (source, target) };
+        is_reached[to] = true;
+        reached_from[to] = Some(from);
         tree.push(next);
     }
-    let sound = pairs.iter().map(|pair| match (poses[pair.target], poses[pair.source]) {
-        (Some(target), Some(source)) => {
-            let back = Uncertain::exact(source.inverse() * target);
-            closes(&misclosure(vec![pair.target, pair.source], &step(pair, pair.target).1.then(&back)))
-        }
-        _ => false,
-    });
-    let sound = sound.collect();
-    loops.extend(long_loops(pairs, &reached_by));
-    SpanningTree { tree, reached_by, sound, loops }
+    let long = between.keys().filter_map(|ends| long_loop(*ends, &reached_from));
+    loops.extend(long.map(|way| closure(pairs, &between, way)));
+    SpanningTree { tree, reached_from, loops }
 }
 
-/// The three pairs in the order in which they lead from `first` back to it.
-fn ordered(pairs: &[PairAlignment], first: usize, mut triangle: [usize; 3]) -> Vec<usize> {
-    let mut at = first;
-    for k in 0..3 {
-        let touches = |pair: usize| pairs[pair].target == at || pairs[pair].source == at;
-        if let Some(next) = (k..3).find(|&i| touches(triangle[i])) {
-            triangle.swap(k, next);
-            at = step(&pairs[triangle[k]], at).0;
-        }
-    }
-    triangle.to_vec()
-}
-
-/// Each pair outside the tree, closed by the tree; triangles are left out.
-fn long_loops(pairs: &[PairAlignment], reached_by: &[Option<(usize, usize)>]) -> Vec<LoopClosure> {
-    let way_up = |mut station: usize| {
-        let mut way = vec![(station, None)];
-        while let Some((from, pair)) = reached_by[station] {
-            way.push((from, Some(pair)));
-            station = from;
-        }
-        way
-    };
-    let in_tree = |pair: usize| reached_by.iter().flatten().any(|(_, used)| *used == pair);
-    let mut loops = Vec::new();
-    for (index, pair) in pairs.iter().enumerate().filter(|(index, _)| !in_tree(*index)) {
-        let (down, up) = (way_up(pair.source), way_up(pair.target));
-        let meet = down.iter().position(|(station, _)| up.iter().any(|(other, _)| other == station));
-        let Some(meet) = meet else { continue };
-        let back = up.iter().position(|(station, _)| *station == down[meet].0).unwrap_or(0);
-        let mut way = vec![index];
-        way.extend(down[1..=meet].iter().filter_map(|(_, pair)| *pair));
-        way.extend(up[1..=back].iter().rev().filter_map(|(_, pair)| *pair));
-        if way.len() > 3 {
-            loops.push(closure(pairs, pair.target, &way));
-        }
-    }
-    loops
-}
-
-/// The pair as refused because of the others.
-pub(crate) fn contradicting(pair: &PairAlignment) -> RefusedPair {
-    let reason = "contradicts the loops that the other pairs close".to_owned();
-    RefusedPair { target: pair.target, source: pair.source, reason }
+/// The tree's way between two stations that a pair outside it joins; triangles are left out.
+fn long_loop((target, source): (usize, usize), reached_from: &[Option<usize>]) -> Option<Vec<usize>> {
+    let to_root = |station| std::iter::successors(Some(station), |at: &usize| reached_from[*at]).collect();
+    let (mut way, up): (Vec<usize>, Vec<usize>) = (to_root(source), to_root(target));
+    let meet = way.iter().position(|station| up.contains(station))?;
+    way.truncate(meet + 1);
+    way.extend(up.iter().take_while(|station| **station != way[meet]).collect::<Vec<_>>().into_iter().rev());
+    way.rotate_right(1);
+    (way.len() > 3).then_some(way)
 }

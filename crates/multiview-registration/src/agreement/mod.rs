@@ -4,4 +4,3 @@ pub(crate) mod alignments;
 pub(crate) mod judges;
 pub(crate) mod loops;
 pub(crate) mod placement;
-pub(crate) mod sight;

@@ -4,13 +4,13 @@
 //! nothing takes no part in it. But it sees furniture where others looked through, and misses what they saw. Some of that
 //! is in every survey, from edges, gross errors, and what moved; so a station is compared with the others of its survey.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
 use crate::agreement::judges::Judges;
-use crate::agreement::sight::{Sight, may_judge};
 use crate::error::Result;
 use crate::relative_pose::check_poses;
+use crate::surfaces::extents::Extent;
 use crate::surfaces::patches::faces_origin;
 use global_registration::{
     CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, agreement_of_rooms, in_voxels,
@@ -29,6 +29,8 @@ pub(crate) const FEWEST_STATIONS: usize = 5;
 const LEVEL: f64 = 0.01;
 /// Stations beyond which they are taken to stand in several rooms: each sees some of the others.
 pub(crate) const ONE_ROOM: usize = 40;
+/// Voxels beyond what a cloud saw at which a point may still lie on that or before it.
+const BEYOND_VOXELS: f64 = 5.0;
 
 /// The verdict on the place of a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,11 +122,21 @@ pub fn judge_placements(stations: &[Cloud], world_from_station: &[Isometry3<f64>
     }
     check_poses("poses of the stations", stations.len(), world_from_station)?;
     let clouds = prepared(stations);
-    let sights: Vec<Option<Sight>> = clouds.iter().map(|cloud| cloud.as_ref().map(Sight::new)).collect();
     let placed = |station: usize| Some((clouds[station].as_ref()?, world_from_station[station]));
-    let sight = |station: usize| Some((sights[station].as_ref()?, world_from_station[station]));
-    let candidates = may_judge(stations.len(), sight);
+    let candidates = may_judge(stations.len(), placed);
     Ok(Placements::of(stations.len(), pairs(&candidates, placed, judged_as(stations.len()))))
+}
+
+/// The pairs of stations of which one may say something of the other: what each saw, and looked through, lies in a box.
+fn may_judge<'a>(count: usize, placed: impl Fn(usize) -> Option<Placed<'a>>) -> Vec<(usize, usize)> {
+    let seen = |station: usize| {
+        let Some((cloud, pose)) = placed(station) else { return Extent::of(std::iter::empty()) };
+        let seen = cloud.points();
+        Extent::placed(seen.iter().chain([&Point3::origin()]), &pose)
+    };
+    let extents: Vec<Extent> = (0..count).map(seen).collect();
+    let voxel_m = (0..count).filter_map(|station| Some(placed(station)?.0.voxel_m())).fold(0.0, f64::max);
+    Extent::pairs(&extents, BEYOND_VOXELS * voxel_m)
 }
 
 /// The clouds in voxels; `None` for one that fills too few.

@@ -11,7 +11,7 @@ use crate::agreement::loops::{LoopClosure, SpanningTree, spanning_tree};
 use crate::pairs_of_frames::frame_pairs::FramePair;
 use crate::pairs_of_frames::frames::ROUNDS;
 use icp_registration::IcpResult;
-use pose_graph::{Edge, Graph, Relation, is_likely};
+use pose_graph::{Edge, Graph, Relation};
 use projective_registration::{FieldMatrix, SharedError};
 use rigid_pose::Uncertain;
 
@@ -118,14 +118,13 @@ fn relation(pair: &FramePair) -> Relation {
 
 /// The frames of the largest part that pairs connect, its first frame first, and the tree from there.
 fn largest_part(count: usize, pairs: &[PairAlignment]) -> (Vec<usize>, SpanningTree) {
-    let closes = |closure: &LoopClosure| is_likely(closure.mahalanobis.powi(2));
     let mut best: Option<(Vec<usize>, SpanningTree)> = None;
     let mut seen = vec![false; count];
     for root in 0..count {
         if seen[root] {
             continue;
         }
-        let found = spanning_tree(pairs, (root, Isometry3::identity()), count, &closes);
+        let found = spanning_tree(pairs, root, count);
         let mut members = vec![root];
         members.extend((0..count).filter(|&k| k != root && found.reaches(k)));
         for &k in &members {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Matrix6};
 
-use crate::agreement::alignments::{PairAlignment, RefusedPair};
+use crate::agreement::alignments::{Overlap, PairAlignment, RefusedPair, best_partners};
 use crate::agreement::loops::{LoopClosure, reached};
 use crate::agreement::placement::{PairAgreement, Placements};
 use crate::error::{Error, Result};
@@ -16,19 +16,13 @@ use crate::survey::registration::Start;
 use projective_registration::{Agreement, FrameAlignmentOptions, OrganisedFrame, SharedError};
 use rigid_pose::InputError;
 
-/// Share of a frame that another must be expected to see for the two to be aligned.
-const LEAST_OVERLAP: f64 = 0.3;
 /// By how much surfaces may stand apart at start poses, share of the depth: poses that err by 5 cm and 2 degrees an axis move them by some
 /// 0.05 against each other at 2 m. Larger ones only try more pairs.
 const START_ERROR: f32 = 0.15;
-/// As [`LEAST_OVERLAP`], at start poses: their errors hide up to half of what two frames share.
-const START_OVERLAP: f64 = 0.15;
 /// Pairs of a frame that are tried, those with the most overlap.
 const PARTNERS: usize = 6;
-/// Frames after each that it is tried with where the order is known.
-const FOLLOWING: usize = 2;
-/// Placed frames, the nearest in order, that a frame is sought from without a guess.
-const SOUGHT: usize = 3;
+/// Where the order is known, frames after each that it is tried with, and placed ones, the nearest, that it is sought from without a guess.
+const NEAREST: usize = 2;
 /// Rounds in which the graph tells further pairs, and in which pairs that do not fit it go and those that fit again come back: two
 /// were enough on all frames tried.
 pub(crate) const ROUNDS: usize = 4;
@@ -212,10 +206,13 @@ impl<'a> Survey<'a> {
     /// Pairs that the start tells.
     fn first(&self) -> Vec<Candidate> {
         match self.start {
-            Start::Poses(poses) => self
-                .overlapping((START_ERROR, START_OVERLAP), Guess::Around, |a, b| Some(poses[a].inverse() * poses[b])),
+            Start::Poses(poses) => {
+                // Their errors hide up to half of what two frames share.
+                let near = (START_ERROR, Agreement::LEAST_OVERLAP / 2.0);
+                self.overlapping(near, Guess::Around, |a, b| Some(poses[a].inverse() * poses[b]))
+            }
             _ => (0..self.count())
-                .flat_map(|target| (1..=FOLLOWING).map(move |step| (target, target + step)))
+                .flat_map(|target| (1..=NEAREST).map(move |step| (target, target + step)))
                 .filter(|(_, source)| *source < self.count())
                 .map(|(target, source)| Candidate { target, source, guess: Guess::Around(Isometry3::identity()) })
                 .collect(),
@@ -229,7 +226,7 @@ impl<'a> Survey<'a> {
             let tried = self.tried.contains(&(a, b)) || self.pairs.iter().any(|pair| pair.joins(a, b));
             (!tried).then_some(pose)
         };
-        self.overlapping((Agreement::LARGEST_ERROR, LEAST_OVERLAP), Guess::Near, open)
+        self.overlapping((Agreement::LARGEST_ERROR, Agreement::LEAST_OVERLAP), Guess::Near, open)
     }
 
     /// For each frame the pairs with the most overlap, at poses `a_from_b`, where surfaces lie within an error, a part of the depth, on
@@ -245,21 +242,13 @@ impl<'a> Survey<'a> {
         for target in 0..self.count() {
             for source in target + 1..self.count() {
                 let Some(pose) = pose(target, source) else { continue };
-                let overlap = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4, error);
-                if overlap >= least {
-                    found.push((overlap, Candidate { target, source, guess: guess(pose) }));
-                }
+                let fraction = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4, error);
+                found.push(Overlap { source, target, fraction });
             }
         }
-        found.sort_by(|x, y| y.0.total_cmp(&x.0));
-        let mut partners = vec![0; self.count()];
-        found.retain(|(_, pair)| {
-            let wanted = partners[pair.target].min(partners[pair.source]) < PARTNERS;
-            partners[pair.target] += usize::from(wanted);
-            partners[pair.source] += usize::from(wanted);
-            wanted
-        });
-        found.into_iter().map(|(_, pair)| pair).collect()
+        let chosen = best_partners(&found, self.count(), least, PARTNERS).into_iter();
+        let candidate = |(target, source)| Some(Candidate { target, source, guess: guess(pose(target, source)?) });
+        chosen.filter_map(candidate).collect()
     }
 
     /// Frames that are not placed yet with placed ones near them in order, without a guess; each pair once.
@@ -269,7 +258,7 @@ impl<'a> Survey<'a> {
             let mut placed: Vec<usize> = graph.members.iter().copied().filter(|other| *other != frame).collect();
             placed.sort_by_key(|other| (other.abs_diff(frame), *other));
             if self.start != Start::Nothing {
-                placed.truncate(SOUGHT);
+                placed.truncate(NEAREST);
             }
             let pairs = placed.into_iter().map(|other| (frame.min(other), frame.max(other)));
             let pairs = pairs.filter(|pair| !self.tried.contains(pair));
@@ -326,8 +315,10 @@ impl<'a> Survey<'a> {
         let (used, wrong): (Vec<_>, Vec<_>) = sound.iter().zip(&graph.fits).partition(|(_, fits)| **fits);
         let placed = |pair: &PairAlignment| [pair.target, pair.source].iter().all(|k| graph.index(*k).is_some());
         let wrong = wrong.iter().map(|(pair, _)| &pair.alignment).filter(|pair| placed(pair));
-        let contradicting = wrong.map(crate::agreement::loops::contradicting);
-        self.refused.extend(contradicting);
+        self.refused.extend(wrong.map(|&PairAlignment { target, source, .. }| {
+            let reason = "contradicts the loops that the other pairs close".to_owned();
+            RefusedPair { target, source, reason }
+        }));
         let lost = |frame: &usize| graph.index(*frame).is_none() && !self.is_out(*frame);
         let lost: Vec<UnplacedFrame> =
             (0..self.count()).filter(lost).map(|frame| UnplacedFrame { frame, reason: self.why(frame) }).collect();

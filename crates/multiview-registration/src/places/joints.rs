@@ -11,12 +11,13 @@ use rayon::prelude::*;
 use rigid_pose::{eigen6, step_pose};
 
 use crate::adjustment::joint_covariance::JointCovariance;
-use crate::adjustment::joints::Joint;
+use crate::adjustment::known::SIGMAS;
 use crate::agreement::loops::reached;
 use crate::error::Result;
 use crate::places::search::{LOOSE, Places, move_by, pairs};
-use crate::places::sought::{AGAINST_IT, SIGMAS};
+use crate::places::sought::AGAINST_IT;
 use crate::planes::shared_planes::root;
+use crate::relative_pose::{RelativePose, Rows};
 
 /// Deviation of a relative pose from which a joint is looked at, patches: in buildings neighbours are held to 1 to 7 thousandths of one, and
 /// what hangs on a single face that was met in the wrong place to 13 (80 mm off). Smaller values only take time.
@@ -81,7 +82,7 @@ impl Places<'_> {
     pub(crate) fn joined(
         &self,
         poses: &mut [Isometry3<f64>],
-        joints: &mut Vec<Joint>,
+        joints: &mut Vec<RelativePose>,
     ) -> Result<(BTreeSet<usize>, bool)> {
         let (mut moved, before) = (BTreeSet::new(), joints.clone());
         let tree = self.tree()?;
@@ -125,20 +126,21 @@ impl Places<'_> {
         weakest: &Weakest,
         beyond: &[bool],
         poses: &mut [Isometry3<f64>],
-        joints: &mut Vec<Joint>,
+        joints: &mut Vec<RelativePose>,
     ) -> bool {
         let is_loose = weakest.sigma_m > LOOSE * self.size_m;
         let begun = self.begun(weakest, beyond, poses);
         let slide_m = match self.between_rays(weakest, beyond, poses, begun) {
             Some(Between { middle_m, half_m, is_elsewhere }) if is_loose || is_elsewhere => {
                 let sigma_m = half_m / 3.0_f64.sqrt();
-                let across = |joint: &Joint| beyond[joint.stations[0]] != beyond[joint.stations[1]];
+                let across = |joint: &RelativePose| beyond[joint.stations[0]] != beyond[joint.stations[1]];
                 if middle_m.abs() <= sigma_m && joints.iter().any(across) {
                     return false;
                 }
                 joints.retain(|joint| !across(joint));
                 let first_from_second = weakest.slid(poses, middle_m);
-                joints.push(Joint { stations: weakest.stations, first_from_second, along: weakest.metres, sigma_m });
+                let rows = Rows::from_rows(&[weakest.metres.transpose() / sigma_m]);
+                joints.push(RelativePose { stations: weakest.stations, first_from_second, rows });
                 middle_m
             }
             None if is_loose => begun.0,

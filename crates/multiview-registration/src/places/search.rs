@@ -9,20 +9,18 @@ use global_registration::{FreeSpace, Look, LookedThrough};
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use crate::adjustment::joints::Joint;
 use crate::adjustment::known::Known;
 use crate::adjustment::network::Network;
 use crate::adjustment::rounds::FEWEST_CONTACTS;
 use crate::adjustment::simultaneous::Adjusted;
 use crate::error::Result;
 use crate::places::sought::Sought;
+use crate::planes::elimination::FEWEST_POINTS;
 use crate::planes::sightings::{APART, Gate, NOWHERE, Sighting, Wide, members};
 use crate::planes::sums::Sums;
-use crate::surfaces::extents::Extent;
-use crate::surfaces::points::{Block, StationPoints};
+use crate::relative_pose::RelativePose;
+use crate::surfaces::points::StationPoints;
 
-/// Points of a station that make a tile one that it saw.
-const FEWEST_POINTS: usize = 5;
 /// Of so many points that lie on planes one is held against the rays of others.
 const STRIDE: usize = 8;
 /// Deviation of a relative pose beyond which two stations do not hold each other, patches: shared planes are joined within as much.
@@ -75,7 +73,7 @@ impl<'a> Places<'a> {
     pub(crate) fn improved(
         &self,
         poses: &mut [Isometry3<f64>],
-        joints: &mut Vec<Joint>,
+        joints: &mut Vec<RelativePose>,
         last: Option<&BTreeSet<usize>>,
     ) -> Result<(BTreeSet<usize>, bool)> {
         let tiles = self.adjusted.shared_planes.last().map_or(0, |plane| plane.tiles.first + plane.tiles.len());
@@ -102,19 +100,6 @@ impl<'a> Places<'a> {
             moved.insert(station);
         }
         Ok((moved, is_new))
-    }
-
-    /// The box about what a station may see from anywhere within reach of a pose.
-    pub(crate) fn around(&self, station: usize, pose: &Isometry3<f64>) -> Extent {
-        let blocks = &self.points[station].blocks;
-        let far = |block: &Block| block.centre.coords.norm() + block.radius_m;
-        let farthest_m = blocks.iter().map(far).fold(0.0, f64::max);
-        // As far as sightings look about a block, and what it moves.
-        let reach_m = |block: &Block| {
-            3.0 * (block.radius_m + self.size_m) + self.reach_m * (1.0 + farthest_m / self.network.hold_m)
-        };
-        let boxes = blocks.iter().map(|block| Extent::about(&(pose * block.centre).coords, reach_m(block)));
-        boxes.reduce(|a, b| a.joined(&b)).unwrap_or_else(|| Extent::of(std::iter::empty()))
     }
 
     /// Tiles that a station saw, ascending.

@@ -4,6 +4,7 @@ use std::cmp::Reverse;
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
+use crate::adjustment::known::SIGMAS;
 use crate::error::Result;
 use crate::places::search::Places;
 use crate::planes::elimination::motion_of;
@@ -21,11 +22,6 @@ const REFINED: usize = 3;
 /// Steps onto the planes, each with points given to them anew, and what poses may be off before the last, patches.
 const STEPS: usize = 4;
 const OFF: f64 = 0.1;
-/// Standard deviations by which more points must lie on planes elsewhere, or fewer contradict: beyond chance, even if points come in
-/// groups of some five. Elsewhere stations of simulated buildings that are right come to 2.1, those 4 to 14 cm off from 19 to 42; with less,
-/// right ones are moved and doubted. Those from where it began within which a station is sought, too: one in a million is farther off along
-/// some axis.
-pub(crate) const SIGMAS: f64 = 5.0;
 /// By which the other of the two may speak against it: as often as one time in forty by chance.
 pub(crate) const AGAINST_IT: f64 = 2.0;
 /// Points that contradict below which no place is better by so much: closer looks would only take time.
@@ -103,7 +99,7 @@ impl<'a> Sought<'a> {
     ) -> Self {
         let (planes, pose) = (&places.adjusted.shared_planes, poses[station]);
         let of_others = |plane: usize| planes[plane].tiles.numbers().any(by_others);
-        let wide = places.wide.within(&places.around(station, &pose), of_others);
+        let wide = places.wide.only(of_others);
         let mut points = places.points[station].clone();
         let gate = Gate { slack_m: 0.0, stride: 1, parameters: 0 };
         let sighting = Sighting::new(&points, &pose, planes, gate);

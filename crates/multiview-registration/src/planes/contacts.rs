@@ -1,9 +1,7 @@
 //! Where the patches of two stations meet, and what each pair in contact observes.
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
-use rigid_pose::InputError;
 
-use crate::error::Result;
 use crate::surfaces::patches::Surface;
 
 /// How far beside a patch its partner may be, in patches: half the diagonal of a cell. Farther ones would be partners
@@ -15,10 +13,6 @@ pub(crate) const BESIDE: f64 = 0.75;
 pub(crate) struct Contact {
     pub source: u32,
     pub target: u32,
-    /// Whether the source's patch looked for its partner, or the target's.
-    pub asked_by_source: bool,
-    /// Share of this contact in what the patch that asked observes.
-    pub share: f64,
 }
 
 /// How partners are looked for.
@@ -26,8 +20,6 @@ pub(crate) struct Contact {
 pub(crate) struct Reach {
     /// How far apart partners may be across their surface, metre.
     pub across_m: f64,
-    /// Of how many nearest patches the first that fits is taken: one, once the stations are nearly in place.
-    pub candidates: usize,
     /// Smallest cosine of the angle between their normals.
     pub cosine: f64,
 }
@@ -44,13 +36,8 @@ impl Reach {
 }
 
 /// The partners of the patches of one station (`asking`) among those of another, `to_asked` being
-/// `asked_from_asking`: pairs of indices.
-pub(crate) fn partners(
-    asking: &Surface,
-    asked: &Surface,
-    to_asked: &Isometry3<f64>,
-    reach: Reach,
-) -> Result<Vec<(u32, u32)>> {
+/// `asked_from_asking`: pairs of indices. The nearest patch is one, or there is none.
+pub(crate) fn partners(asking: &Surface, asked: &Surface, to_asked: &Isometry3<f64>, reach: Reach) -> Vec<(u32, u32)> {
     let rotation = to_asked.rotation.to_rotation_matrix().into_inner();
     let beside_m = BESIDE * asking.size_m.max(asked.size_m);
     let farthest_m = reach.farthest_m(asking.size_m.max(asked.size_m));
@@ -58,37 +45,22 @@ pub(crate) fn partners(
     let mut found = Vec::new();
     for (index, patch) in asking.patches.iter().enumerate() {
         let centre = rotation * patch.centre.coords + to_asked.translation.vector;
-        if !rigid_pose::is_usable(&centre.into()) {
-            return Err(InputError::NonFinite { what: "points of a station in the frame of another", index }.into());
-        }
         if !asked.extent.is_near(&centre, farthest_m) {
             continue;
         }
-        let normal = rotation * patch.normal;
-        let fits = |other: usize| {
-            let other = &asked.patches[other];
-            let apart = centre - other.centre.coords;
-            let across = other.normal.dot(&apart);
-            let cosine = normal.dot(&other.normal);
-            across.abs() <= reach.across_m
-                && apart.norm_squared() - across * across <= beside_m * beside_m
-                && if signed { cosine >= reach.cosine } else { cosine.abs() >= reach.cosine }
-        };
-        let nearest = asked.tree.any_nearest(&[centre.x, centre.y, centre.z]);
-        if nearest.distance_m > farthest_m {
-            continue;
+        let nearest = asked.tree.any_nearest(&[centre.x, centre.y, centre.z]).index;
+        let other = &asked.patches[nearest];
+        let apart = centre - other.centre.coords;
+        let across = other.normal.dot(&apart);
+        let cosine = other.normal.dot(&(rotation * patch.normal));
+        if across.abs() <= reach.across_m
+            && apart.norm_squared() - across * across <= beside_m * beside_m
+            && if signed { cosine >= reach.cosine } else { cosine.abs() >= reach.cosine }
+        {
+            found.push((index as u32, nearest as u32));
         }
-        let partner = if fits(nearest.index) {
-            Some(nearest.index)
-        } else if reach.candidates > 1 {
-            let near = asked.tree.k_nearest(&centre.into(), reach.candidates)?;
-            near.iter().map(|neighbour| neighbour.index).find(|&other| fits(other))
-        } else {
-            None
-        };
-        found.extend(partner.map(|other| (index as u32, other as u32)));
     }
-    Ok(found)
+    found
 }
 
 /// What a contact observes: the distance of the two patches along their common normal.
@@ -110,7 +82,7 @@ pub(crate) struct Observed {
 pub(crate) fn observe(
     source: &Surface,
     target: &Surface,
-    contact: &Contact,
+    contact: Contact,
     target_from_source: &Isometry3<f64>,
 ) -> Observed {
     let (from, to) = (&source.patches[contact.source as usize], &target.patches[contact.target as usize]);
@@ -145,7 +117,7 @@ fn along_direction(
 /// something about sliding.
 pub(crate) fn imitated(
     source: &Surface,
-    contact: &Contact,
+    contact: Contact,
     observed: &Observed,
     target_from_source: &Isometry3<f64>,
 ) -> Matrix6<f64> {

@@ -16,9 +16,9 @@ use crate::planes::sums::{Sums, TileSums};
 /// How well the slopes of a shared plane are known from the patches that it was found by, radian.
 const SLOPE: f64 = 0.02;
 
-/// Fewest points of a station on tiles of a shared plane that others saw too by which it takes part there: one or two are gross errors, or
-/// lie on something beside the plane, and would hold a whole building where nothing else does.
-const FEWEST_COMMON: usize = 5;
+/// Fewest points of a station by which it saw a tile, or takes part in a shared plane by tiles that others saw too: one or two are gross
+/// errors, or lie on something beside the plane, and would hold a whole building where nothing else does.
+pub(crate) const FEWEST_POINTS: usize = 5;
 
 /// Variances beyond the noise of points, metre².
 #[derive(Debug, Clone, Copy, Default)]
@@ -54,18 +54,9 @@ pub(crate) struct Seen<'s> {
 pub(crate) enum Products {
     /// Of all with all, and with the shared parameters; the plane eliminated.
     Eliminated(DMatrix<f64>),
-    /// Of a plane that very many stations saw: those of stations that saw the same tiles (the lower triangle), of the plane with
-    /// all stations, and of the plane with itself. Elimination would couple all of its stations with each other.
-    Beside(Box<WideProducts>),
-}
-
-/// See [`Products::Beside`].
-#[derive(Debug, Clone)]
-pub(crate) struct WideProducts {
-    pub pairs: BTreeMap<(usize, usize), Matrix3<f64>>,
-    pub with_plane: DMatrix<f64>,
-    pub of_plane: Matrix3<f64>,
-    pub right: Vector3<f64>,
+    /// Of a plane that very many stations saw: those of stations that saw the same tiles (the lower triangle), and of the plane with
+    /// itself. Elimination would couple all of its stations with each other.
+    Beside(BTreeMap<(usize, usize), Matrix3<f64>>, Matrix3<f64>),
 }
 
 /// Normal equations of a shared plane: three unknowns a station that saw it, then the shared parameters, filled up to threes.
@@ -76,8 +67,8 @@ pub(crate) struct Eliminated {
     pub right: DVector<f64>,
     /// Inverse of the normal matrix of the plane, and what it gets from the motions and from the distances.
     inverse: Matrix3<f64>,
-    from_motions: DMatrix<f64>,
-    from_distances: Vector3<f64>,
+    pub from_motions: DMatrix<f64>,
+    pub from_distances: Vector3<f64>,
 }
 
 impl<'a> SharedPlaneSums<'a> {
@@ -109,22 +100,18 @@ impl<'a> SharedPlaneSums<'a> {
         for one in seen.chunk_by(|a, b| a.tile == b.tile).filter(|tile| tile.len() > 1).flatten() {
             common[one.of] += self.sums[stations[one.of]].count(one.slot);
         }
-        let saw: Vec<bool> = common.iter().map(|points| *points >= FEWEST_COMMON).collect();
-        seen.retain(|one| saw[one.of]);
-        let place: Vec<usize> = saw
+        let all = stations.len();
+        let stations: Vec<usize> = stations
             .iter()
-            .scan(0, |count, saw| {
-                *count += usize::from(*saw);
-                Some(*count)
-            })
+            .zip(common)
+            .filter(|(_, points)| *points >= FEWEST_POINTS)
+            .map(|(station, _)| *station)
             .collect();
-        for one in &mut seen {
-            one.of = place[one.of] - 1;
-        }
-        let stations: Vec<usize> =
-            stations.iter().zip(&saw).filter(|(_, saw)| **saw).map(|(station, _)| *station).collect();
         if stations.len() < 2 {
             return None;
+        }
+        if stations.len() < all {
+            seen = self.seen(&stations);
         }
         Some(Tiled::new(&seen, stations.len(), self.sums[0].order, variances).eliminated(stations, most))
     }
@@ -204,8 +191,7 @@ impl Tiled {
         of_plane[(2, 2)] += SLOPE.powi(-2);
         let inverse = of_plane.try_inverse().unwrap_or_else(Matrix3::zeros);
         let products = if size == 3 * count && count > most {
-            let with_plane = -&from_motions;
-            Products::Beside(Box::new(WideProducts { pairs, with_plane, of_plane, right: -from_distances }))
+            Products::Beside(pairs, of_plane)
         } else {
             let mut normal = DMatrix::zeros(size, size);
             for (&(a, b), block) in &pairs {

@@ -38,7 +38,7 @@ pub(crate) struct Scene<'a> {
     pub parameters: usize,
 }
 
-/// A linearised contact: whitened residual, derivative by `x`, weight (kernel and share).
+/// A linearised contact: whitened residual, derivative by `x`, weight.
 struct Row {
     residual: f64,
     jacobian: DVector<f64>,
@@ -46,7 +46,7 @@ struct Row {
 }
 
 impl Scene<'_> {
-    fn observed(&self, pair_contacts: &PairContacts, contact: &Contact, pose: &Isometry3<f64>) -> Observed {
+    fn observed(&self, pair_contacts: &PairContacts, contact: Contact, pose: &Isometry3<f64>) -> Observed {
         observe(self.surfaces[pair_contacts.source], self.surfaces[pair_contacts.target], contact, pose)
     }
 
@@ -54,7 +54,7 @@ impl Scene<'_> {
     fn row(
         &self,
         pair_contacts: &PairContacts,
-        contact: &Contact,
+        contact: Contact,
         pose: &Isometry3<f64>,
         scale: f64,
     ) -> (Row, Observed) {
@@ -71,14 +71,14 @@ impl Scene<'_> {
             jacobian[6 + k] = observed.normal.dot(&moved) / sigma;
         }
         let residual = observed.residual / sigma;
-        let weight = contact.share * KERNEL.weight(residual / scale);
+        let weight = KERNEL.weight(residual / scale);
         (Row { residual, jacobian, weight }, observed)
     }
 
     pub(crate) fn whitened_residual(
         &self,
         pair_contacts: &PairContacts,
-        contact: &Contact,
+        contact: Contact,
         pose: &Isometry3<f64>,
     ) -> f64 {
         let observed = self.observed(pair_contacts, contact, pose);
@@ -107,7 +107,7 @@ pub(crate) fn reduce(
     let n = 6 + scene.parameters;
     let (mut information, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
     let mut imitation = DMatrix::zeros(n, n);
-    for contact in &pair_contacts.contacts {
+    for &contact in &pair_contacts.contacts {
         let (row, observed) = scene.row(pair_contacts, contact, pose, scale);
         information.ger(row.weight, &row.jacobian, &row.jacobian, 1.0);
         gradient.axpy(row.weight * row.residual, &row.jacobian, 1.0);

@@ -7,13 +7,12 @@ use statistics::mad_scale;
 use crate::planes::elimination::{Eliminated, SharedPlaneSums, Variances};
 use crate::planes::sightings::KERNEL;
 use crate::planes::sums::Sums;
+use crate::surfaces::patches::FEWEST_POINTS;
 
 /// Widening of the kernel for means of tiles: what is on the surface keeps its weight.
 const WIDE: f64 = 2.0;
 /// Standard deviations beyond which a tile says nothing of the variances.
 const CLIPPED: f64 = 4.0;
-/// Fewest tiles that show how plane a shared plane is.
-const FEWEST_TILES: usize = 6;
 
 /// The mean distance of a station's points in a tile from the shared plane.
 #[derive(Debug, Clone, Copy)]
@@ -130,7 +129,7 @@ pub(crate) fn roughness(means: &[TileMean], shared: f64) -> f64 {
         weights += sum;
         tiles += 1;
     }
-    if tiles < FEWEST_TILES { 0.0 } else { ((squares - (tiles as f64 - 3.0)) / weights).max(0.0) }
+    if tiles < FEWEST_POINTS { 0.0 } else { ((squares - (tiles as f64 - 3.0)) / weights).max(0.0) }
 }
 
 /// Variances of a shared plane.

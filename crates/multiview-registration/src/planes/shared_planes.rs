@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use crate::error::Result;
 use crate::planes::contacts::Contact;
 use crate::planes::reduction::PairContacts;
 use crate::planes::tiles::Tiles;
-use crate::surfaces::extents::{Extent, Extents};
-use crate::surfaces::grouping::cell;
+use crate::surfaces::extents::Extent;
 use crate::surfaces::patches::{Surface, axes};
 use crate::surfaces::plane_fit::{Moments, SAME_DIRECTION};
 use crate::surfaces::regions::{OFF_PLANE, ROUGHER};
+use point_cloud::NeighbourTree;
 
 /// How far patches of neighbouring pieces of a plane may be apart, patches.
 const BESIDE: f64 = 2.0;
@@ -65,11 +66,11 @@ pub(crate) fn shared_planes(
     poses: &[Isometry3<f64>],
     pairs_in_contact: &[PairContacts],
     tolerance_m: f64,
-) -> Vec<SharedPlane> {
-    let Some(first) = poses.first() else { return Vec::new() };
+) -> Result<Vec<SharedPlane>> {
+    let Some(first) = poses.first() else { return Ok(Vec::new()) };
     let mut joined = Joined::new(surfaces, poses, first.translation.vector, tolerance_m);
     joined.join_regions(pairs_in_contact);
-    joined.join_neighbours();
+    joined.join_neighbours()?;
     let mut shared_plane_of = joined.adopt_patches(pairs_in_contact);
     let mut shared_planes = joined.wide(&shared_plane_of);
     joined.small(pairs_in_contact, &mut shared_plane_of, &mut shared_planes);
@@ -78,7 +79,7 @@ pub(crate) fn shared_planes(
         shared_plane.tiles.first = tiles;
         tiles += shared_plane.tiles.len();
     }
-    shared_planes
+    Ok(shared_planes)
 }
 
 /// Regions as a forest: those of one tree are one plane.
@@ -136,7 +137,7 @@ impl<'a> Joined<'a> {
     }
 
     /// Joins pieces of a plane that lie beside each other: what stands before a wall divides it for each station.
-    fn join_neighbours(&mut self) {
+    fn join_neighbours(&mut self) -> Result<()> {
         let mut centres: BTreeMap<usize, Vec<Point3<f64>>> = BTreeMap::new();
         for (station, surface) in self.surfaces.iter().enumerate() {
             for (patch, place) in surface.patches.iter().enumerate() {
@@ -146,19 +147,20 @@ impl<'a> Joined<'a> {
             }
         }
         let reach_m = BESIDE * self.size_m();
-        let pieces: Vec<(usize, Piece)> =
-            centres.into_iter().map(|(root, centres)| (root, Piece::new(centres, reach_m))).collect();
+        let piece = |(root, centres)| Ok((root, Piece::new(centres)?));
+        let pieces: Vec<(usize, Piece)> = centres.into_iter().map(piece).collect::<Result<_>>()?;
         let extents: Vec<Extent> = pieces.iter().map(|(_, piece)| piece.extent).collect();
-        for (a, b) in Extents::new(&extents).pairs(reach_m) {
+        for (a, b) in Extent::pairs(&extents, reach_m) {
             let ((a, first_piece), (b, second_piece)) = (&pieces[a], &pieces[b]);
             let (first, second) = (self.normals[self.root(*a)], self.normals[self.root(*b)]);
             if self.root(*a) != self.root(*b)
                 && first.dot(&second) >= SAME_DIRECTION * first.norm() * second.norm()
-                && first_piece.is_beside(second_piece)
+                && first_piece.is_beside(second_piece, reach_m)
             {
                 self.join(*a, *b);
             }
         }
+        Ok(())
     }
 
     fn join(&mut self, a: usize, b: usize) {
@@ -302,36 +304,24 @@ pub(crate) fn root(parent: &[usize], mut node: usize) -> usize {
     node
 }
 
-/// The patches of one piece of a plane, cell by cell.
+/// The patches of one piece of a plane.
 struct Piece {
     centres: Vec<Point3<f64>>,
-    /// Cells of the size of the reach, ascending, with the centres in them.
-    cells: Vec<([i64; 3], u32)>,
+    tree: NeighbourTree,
     extent: Extent,
-    reach_m: f64,
 }
 
 impl Piece {
-    fn new(centres: Vec<Point3<f64>>, reach_m: f64) -> Self {
-        let mut cells: Vec<([i64; 3], u32)> =
-            centres.iter().enumerate().map(|(k, centre)| (cell(centre, reach_m), k as u32)).collect();
-        cells.sort_unstable();
-        Self { extent: Extent::of(centres.iter().copied()), centres, cells, reach_m }
+    fn new(centres: Vec<Point3<f64>>) -> Result<Self> {
+        let tree = NeighbourTree::new(&centres)?;
+        Ok(Self { extent: Extent::of(centres.iter().copied()), centres, tree })
     }
 
     /// Whether a patch of the one is in reach of a patch of the other.
-    fn is_beside(&self, other: &Self) -> bool {
+    fn is_beside(&self, other: &Self, reach_m: f64) -> bool {
         let (few, many) = if self.centres.len() <= other.centres.len() { (self, other) } else { (other, self) };
-        few.centres.iter().any(|centre| many.extent.is_near(&centre.coords, self.reach_m) && many.is_near(centre))
-    }
-
-    fn is_near(&self, centre: &Point3<f64>) -> bool {
-        let [x, y, z] = cell(centre, self.reach_m);
-        (0..9).map(|k| [x + k / 3 - 1, y + k % 3 - 1]).any(|[x, y]| {
-            let first = self.cells.partition_point(|(cell, _)| *cell < [x, y, z - 1]);
-            let mut column = self.cells[first..].iter().take_while(|(cell, _)| *cell <= [x, y, z + 1]);
-            column.any(|(_, other)| (centre - self.centres[*other as usize]).norm() <= self.reach_m)
-        })
+        let mut near = few.centres.iter().filter(|centre| many.extent.is_near(&centre.coords, reach_m));
+        near.any(|centre| many.tree.any_nearest(&centre.coords.into()).distance_m <= reach_m)
     }
 }
 

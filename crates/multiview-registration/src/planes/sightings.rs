@@ -60,10 +60,9 @@ impl Wide {
         Self { indices, extents }
     }
 
-    /// Those of them that meet a box and are wanted.
-    pub(crate) fn within(&self, things: &Extent, is_wanted: impl Fn(usize) -> bool) -> Self {
-        let all = self.indices.iter().zip(&self.extents);
-        let kept = all.filter(|(index, extent)| extent.meets(things, 0.0) && is_wanted(**index));
+    /// Those of them that are wanted.
+    pub(crate) fn only(&self, is_wanted: impl Fn(usize) -> bool) -> Self {
+        let kept = self.indices.iter().zip(&self.extents).filter(|(index, _)| is_wanted(**index));
         let (indices, extents) = kept.map(|(index, extent)| (*index, *extent)).unzip();
         Self { indices, extents }
     }

@@ -1,7 +1,7 @@
 //! The extent of a shared plane as a grid of tiles.
 
 /// What is known of a tile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Tile {
     /// Nobody saw the shared plane there.
     Outside,
@@ -18,7 +18,7 @@ pub(crate) struct Tiles {
     low: [i64; 2],
     columns: usize,
     rows: usize,
-    kinds: Vec<u8>,
+    kinds: Vec<Tile>,
     /// Number of the first tile among those of all shared planes.
     pub first: usize,
 }
@@ -37,13 +37,19 @@ impl Tiles {
         let (across, along) = (ends(0), ends(1));
         let columns = ((across.1 - across.0 + 1) as usize).min(MOST);
         let rows = ((along.1 - along.0 + 1) as usize).min(MOST);
-        let mut tiles =
-            Self { size_m, low: [across.0, along.0], columns, rows, kinds: vec![0; columns * rows], first: 0 };
+        let mut tiles = Self {
+            size_m,
+            low: [across.0, along.0],
+            columns,
+            rows,
+            kinds: vec![Tile::Outside; columns * rows],
+            first: 0,
+        };
         for place in places {
             let [column, row] = cell(place);
             for (c, r) in (-1..2).flat_map(|c| (-1..2).map(move |r| (c, r))) {
                 if let Some(index) = tiles.index_of([column + c, row + r]) {
-                    tiles.kinds[index] = tiles.kinds[index].max(if (c, r) == (0, 0) { 2 } else { 1 });
+                    tiles.kinds[index] = tiles.kinds[index].max(if (c, r) == (0, 0) { Tile::Core } else { Tile::Rim });
                 }
             }
         }
@@ -52,7 +58,7 @@ impl Tiles {
 
     /// A single tile around the origin.
     pub(crate) fn one(size_m: f64) -> Self {
-        Self { size_m, low: [0; 2], columns: 1, rows: 1, kinds: vec![2], first: 0 }
+        Self { size_m, low: [0; 2], columns: 1, rows: 1, kinds: vec![Tile::Core], first: 0 }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -72,11 +78,8 @@ impl Tiles {
 
     /// The tile at this place, counted over all shared planes, and what is known of it.
     pub fn at(&self, place: [f64; 2]) -> (usize, Tile) {
-        match self.index_of(place.map(|value| (value / self.size_m).floor() as i64)) {
-            Some(index) if self.kinds[index] == 2 => (self.first + index, Tile::Core),
-            Some(index) if self.kinds[index] == 1 => (self.first + index, Tile::Rim),
-            _ => (0, Tile::Outside),
-        }
+        let index = self.index_of(place.map(|value| (value / self.size_m).floor() as i64));
+        index.map_or((0, Tile::Outside), |index| (self.first + index, self.kinds[index]))
     }
 
     /// Column and row of a tile, counted over all shared planes.
@@ -95,10 +98,6 @@ impl Tiles {
 
     /// Whether a disc around this place may touch the tiles.
     pub(crate) fn near(&self, place: [f64; 2], radius_m: f64) -> bool {
-        let within = |axis: usize, count: usize| {
-            let low = self.low[axis] as f64 * self.size_m;
-            place[axis] >= low - radius_m && place[axis] <= low + count as f64 * self.size_m + radius_m
-        };
-        within(0, self.columns) && within(1, self.rows)
+        place.iter().zip(self.ends()).all(|(at, [low, high])| (low - radius_m..=high + radius_m).contains(at))
     }
 }

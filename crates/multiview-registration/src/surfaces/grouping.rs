@@ -9,7 +9,7 @@ const SAME_DIRECTION: f64 = 0.866;
 /// Part of the cell that the points of a group may be off the plane of its first points.
 const THICKNESS: f64 = 0.35;
 /// Points per patch that the size of the patches is chosen for.
-const POINTS_PER_PATCH: f64 = 25.0;
+pub(crate) const POINTS_PER_PATCH: f64 = 25.0;
 
 /// A group on its way.
 struct Group {
@@ -39,7 +39,7 @@ pub(crate) fn by_cells(cloud: &Cloud, usable: impl Fn(usize) -> bool, size_m: f6
 }
 
 /// The cell of space that a point lies in.
-pub(crate) fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
+fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
     <[f64; 3]>::from(point.coords).map(|x| (x / size_m).floor() as i64)
 }
 

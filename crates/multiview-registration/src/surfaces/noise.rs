@@ -4,13 +4,12 @@
 //! Where none come, they are a power of the range: noise grows with it by a law that differs from camera to camera, and
 //! weights that follow another law cost precision.
 
-use statistics::upper_median;
+use statistics::{Distribution, upper_median};
 
+use crate::surfaces::grouping::POINTS_PER_PATCH;
 use crate::surfaces::patches::{Patch, Surface};
 use crate::surfaces::points::EDGE_ON;
 
-/// Median over mean of a chi-squared with about 25 degrees of freedom.
-const MEDIAN_SHARE: f64 = 0.973;
 /// Groups of patches of like range, each of which gives a median: patches across a crease are no plane.
 const GROUPS: usize = 12;
 /// Fewest patches of a group.
@@ -70,12 +69,14 @@ impl NoiseLaw {
 }
 
 fn ratios(said: &[f64], surface: &Surface) -> Vec<(f64, f64)> {
+    // Median over mean of what as many points as a patch is to have leave.
+    let median_share = Distribution::ChiSquared { dof: POINTS_PER_PATCH }.quantile(0.5) / POINTS_PER_PATCH;
     let patches = surface.patches.iter().enumerate();
-    patches.filter_map(|(index, patch)| ratio(said, surface.points_of(index), patch)).collect()
+    patches.filter_map(|(index, patch)| ratio(said, surface.points_of(index), patch, median_share)).collect()
 }
 
 /// Logarithms of the range of a patch and of the ratio of variances along its rays, found to said.
-fn ratio(said: &[f64], members: &[u32], patch: &Patch) -> Option<(f64, f64)> {
+fn ratio(said: &[f64], members: &[u32], patch: &Patch, median_share: f64) -> Option<(f64, f64)> {
     let range = patch.centre.coords.norm();
     let cosine = patch.normal.dot(&patch.centre.coords) / range;
     let (mut square, mut count) = (0.0, 0.0);
@@ -83,7 +84,7 @@ fn ratio(said: &[f64], members: &[u32], patch: &Patch) -> Option<(f64, f64)> {
         square += sigma * sigma;
         count += 1.0;
     }
-    let expected = square / count * (cosine * cosine + EDGE_ON) * MEDIAN_SHARE;
+    let expected = square / count * (cosine * cosine + EDGE_ON) * median_share;
     let (at, ratio) = (range.ln(), (patch.point_variance / expected).max(LEAST_RATIO).ln());
     (at.is_finite() && ratio.is_finite()).then_some((at, ratio))
 }

@@ -14,9 +14,8 @@ use point_cloud::eigenvalues3;
 const NOISE: f64 = 14.0;
 /// Part of the points that must lie in patches that wide for their noise.
 const ENOUGH: f64 = 0.9;
-/// Factor between sizes that are tried, and how many.
+/// Factor between sizes that are tried.
 const STEP: f64 = std::f64::consts::SQRT_2;
-const MOST_STEPS: usize = 12;
 
 /// Size of the patches of a cloud, metre: about 25 points each, and more where noise asks for it.
 ///
@@ -27,19 +26,18 @@ pub(crate) fn size(cloud: &Cloud, normals: &[Vector3<f64>]) -> f64 {
     let first_m = patch_size(cloud);
     let (mut best_m, mut best_ratio) = (first_m, 0.0);
     let mut size_m = first_m;
-    for _ in 0..MOST_STEPS {
+    loop {
         let ratio = size_m / scatter(cloud, normals, 2.0 * size_m);
         // No scatter, and none that could be told, is no reason for another size.
         if ratio.is_nan() || ratio >= NOISE {
             return size_m;
         }
         if ratio < best_ratio {
-            break;
+            return best_m;
         }
         (best_m, best_ratio) = (size_m, ratio);
         size_m *= STEP;
     }
-    best_m
 }
 
 /// Standard deviation across patches of a size that nearly all points do not exceed, metre.

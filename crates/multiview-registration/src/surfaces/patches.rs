@@ -18,7 +18,7 @@ use crate::surfaces::regions::{Patches, Region};
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
 
-/// Fewest points of a patch: those whose scatter about a plane says something.
+/// Fewest points of a patch, or tiles of a shared plane: those whose scatter about a plane says something.
 pub(crate) const FEWEST_POINTS: usize = 6;
 /// Neighbouring patches that may belong to the same plane: those around one in a grid, and some more.
 const NEIGHBOURS: usize = 13;

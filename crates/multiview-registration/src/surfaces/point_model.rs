@@ -1,7 +1,7 @@
 //! Points that depend on parameters which all stations share.
 
 use nalgebra::Point3;
-use rigid_pose::{InputError, require_length};
+use rigid_pose::{InputError, require_length, require_points};
 
 use crate::error::Result;
 
@@ -75,4 +75,23 @@ pub(crate) fn checked_prior(model: &dyn PointModel) -> Result<Prior> {
         );
     }
     Ok((values, sigma))
+}
+
+/// Points, with their derivatives by all parameters, point by point.
+pub(crate) type Evaluated = (Vec<Point3<f64>>, Vec<[f64; 3]>);
+
+/// All points of a station at these parameters, with the derivatives of each (one entry a parameter).
+pub(crate) fn evaluated(model: &dyn PointModel, station: usize, count: usize, parameters: &[f64]) -> Result<Evaluated> {
+    let m = parameters.len();
+    let mut derivatives = vec![[0.0; 3]; count * m];
+    let point = |index: usize| {
+        let own = &mut derivatives[index * m..(index + 1) * m];
+        model.point(station, index, parameters, Some(own))
+    };
+    let points: Vec<Point3<f64>> = (0..count).map(point).collect();
+    require_points("points of the point model", &points)?;
+    match derivatives.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
+        Some(index) => Err(InputError::NonFinite { what: "derivatives of the point model", index }.into()),
+        None => Ok((points, derivatives)),
+    }
 }

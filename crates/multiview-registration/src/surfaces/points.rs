@@ -5,15 +5,13 @@
 //! for that would mislead: the rays tell which surface they saw, and what mixes two is far from both.
 
 use nalgebra::{Point3, Vector3};
-use rigid_pose::InputError;
 
 use crate::error::Result;
 use crate::surfaces::grouping::by_cells;
 use crate::surfaces::noise::NoiseLaw;
 use crate::surfaces::patches::Surface;
-use crate::surfaces::point_model::PointModel;
+use crate::surfaces::point_model::{PointModel, evaluated};
 use point_cloud::Cloud;
-use rigid_pose::require_points;
 
 /// Size of a block, patches.
 const BLOCK: f64 = 2.0;
@@ -97,16 +95,9 @@ impl StationPoints {
         count: usize,
         parameters: &[f64],
     ) -> Result<()> {
-        let (m, mut cloud) = (parameters.len(), vec![Point3::origin(); count]);
-        self.derivatives.resize(self.cloud_index.len() * m, [0.0; 3]);
-        for (slot, &index) in self.cloud_index.iter().enumerate() {
-            let derivatives = &mut self.derivatives[slot * m..(slot + 1) * m];
-            cloud[index as usize] = model.point(station, index as usize, parameters, Some(derivatives));
-        }
-        require_points("points of the point model", &cloud)?;
-        if let Some(index) = self.derivatives.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
-            return Err(InputError::NonFinite { what: "derivatives of the point model", index }.into());
-        }
+        let (cloud, derivatives) = evaluated(model, station, count, parameters)?;
+        let of = |&index: &u32| index as usize * parameters.len()..(index as usize + 1) * parameters.len();
+        self.derivatives = self.cloud_index.iter().flat_map(|index| &derivatives[of(index)]).copied().collect();
         self.place(&cloud);
         Ok(())
     }

@@ -1,7 +1,6 @@
 //! The registration of all stations as a whole: what goes in, and what comes out.
 
 pub(crate) mod blind;
-pub(crate) mod check;
 pub(crate) mod datum;
 pub(crate) mod pairs;
 pub(crate) mod point_residuals;

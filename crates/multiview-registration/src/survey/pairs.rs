@@ -1,4 +1,4 @@
-//! Two stations by themselves, from the tiles that both saw.
+//! Two stations by themselves, from the tiles that both saw, and how loops of such pairs close.
 
 use nalgebra::{DVector, Isometry3, Matrix6};
 use rayon::prelude::*;
@@ -6,13 +6,18 @@ use rayon::prelude::*;
 use crate::adjustment::equations::Equations;
 use crate::adjustment::known::Known;
 use crate::adjustment::precision;
+use crate::adjustment::rounds::FEWEST_CONTACTS;
 use crate::adjustment::simultaneous::Adjusted;
-use crate::agreement::alignments::{Overlap, PairAlignment};
+use crate::agreement::alignments::{Overlap, PairAlignment, best_partners};
+use crate::agreement::loops::{LoopClosure, spanning_tree};
 use crate::error::Result;
 use crate::planes::elimination::SharedPlaneSums;
 use crate::planes::scatter::TileMean;
 use icp_registration::{IcpResult, StopReason};
 use rigid_pose::{step_pose, symmetrised};
+
+/// Partners that each station is held against by itself, those with the most overlap.
+const PARTNERS: usize = 3;
 
 /// A tile that two stations saw.
 #[derive(Debug, Clone, Copy)]
@@ -57,9 +62,19 @@ impl Adjusted {
         enough.map(overlap).collect()
     }
 
-    /// The poses of pairs if nothing but the two stations had been there.
-    pub(crate) fn pairs(&self, pairs: &[(usize, usize)], hold_m: f64, size_m: f64) -> Result<Vec<PairAlignment>> {
-        pairs.par_iter().map(|&(target, source)| self.pair(target, source, hold_m, size_m)).collect()
+    /// The poses of the pairs with the most overlap if nothing but the two stations had been there, and how their loops close.
+    pub(crate) fn alone(
+        &self,
+        minimum_overlap: f64,
+        held: usize,
+        (hold_m, size_m): (f64, f64),
+    ) -> Result<(Vec<PairAlignment>, Vec<LoopClosure>)> {
+        let count = self.state.poses.len();
+        let chosen = best_partners(&self.overlaps(FEWEST_CONTACTS), count, minimum_overlap, PARTNERS);
+        let pairs = chosen.par_iter().map(|&(target, source)| self.pair(target, source, hold_m, size_m));
+        let pairs = pairs.collect::<Result<Vec<_>>>()?;
+        let loops = spanning_tree(&pairs, held, count).loops;
+        Ok((pairs, loops))
     }
 
     fn pair(&self, target: usize, source: usize, hold_m: f64, size_m: f64) -> Result<PairAlignment> {

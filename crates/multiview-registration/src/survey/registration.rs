@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use crate::adjustment::joint_covariance::JointCovariance;
 use crate::adjustment::turns::MeasuredTurn;
-use crate::agreement::alignments::{PairAlignment, RefusedPair};
+use crate::agreement::alignments::PairAlignment;
 use crate::agreement::loops::LoopClosure;
 use crate::agreement::placement::Placements;
 use crate::surfaces::patches::Surface;
@@ -113,8 +113,6 @@ pub struct StationRegistration {
     pub joint_covariance: JointCovariance,
     /// Pairs with much overlap by themselves, at the adjusted poses.
     pub pairs: Vec<PairAlignment>,
-    /// Pairs that overlap and were left out, with the reason.
-    pub refused: Vec<RefusedPair>,
     /// How loops of pairs close.
     pub loops: Vec<LoopClosure>,
     /// All pairs whose surfaces took part in the adjustment, with their residuals.

@@ -9,19 +9,18 @@ use crate::adjustment::network::{Network, State};
 use crate::adjustment::precision;
 use crate::adjustment::rounds::FEWEST_CONTACTS;
 use crate::adjustment::simultaneous::Adjusted;
-use crate::agreement::alignments::Overlap;
-use crate::agreement::loops::reached;
+use crate::agreement::alignments::{Overlap, PairAlignment};
+use crate::agreement::loops::{LoopClosure, reached};
 use crate::agreement::placement::{Placements, judge_placements};
 use crate::error::{Error, Result};
 use crate::relative_pose::check_poses;
 use crate::surfaces::point_model::SharedParameters;
 use crate::surfaces::points::StationPoints;
-use crate::survey::check::{Checked, checked};
 use crate::survey::datum::Datum;
 use crate::survey::registration::{
     Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
-use crate::survey::together::{Brought, brought_together, is_whole, network, prior_of};
+use crate::survey::together::{Brought, brought_together, is_whole};
 use point_cloud::Cloud;
 use rigid_pose::{InputError, require_option, require_positive};
 
@@ -35,8 +34,8 @@ const MOST_ARRANGED: usize = 200;
 ///
 /// Wide rounds bring the stations together where patches of their surfaces meet, all overlaps in one system with contacts
 /// found anew in each round (`[ChenMedioni1992]`, `[Pulli1999]`). The last rounds take all points: each station's pieces of
-/// a surface are joined to shared planes, whose planes are unknown too and eliminated exactly. Then pairs are held against their
-/// loops. `progress(done, total)` is told the rounds of each part.
+/// a surface are joined to shared planes, whose planes are unknown too and eliminated exactly. Then loops of
+/// pairs are closed. `progress(done, total)` is told the rounds of each part.
 ///
 /// Clouds without normals get them from their nearest neighbours.
 ///
@@ -52,15 +51,13 @@ pub fn register_stations(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<StationRegistration> {
     validate(stations, start, datum, options)?;
-    let (prior, names) = prior_of(options)?;
     let whole = is_whole(stations.len(), start, options);
-    let Brought { adjusted, start, points, placements: judged, prepared, radius_m, patch_m } =
+    let Brought { adjusted, start, points, placements: judged, prepared, network, patch_m } =
         brought_together(stations, start, datum, (options, whole), progress)?;
-    let network = network(datum, radius_m, options, (&prior, &names), whole);
     require_connected(&adjusted, datum)?;
     let placements = judged.map_or_else(|| placements(stations, points, &adjusted.state), Ok)?;
-    let checked = checked(&adjusted, options.minimum_overlap, datum, (radius_m, patch_m))?;
-    let result = result(checked, adjusted, &start, &network, datum, patch_m);
+    let alone = adjusted.alone(options.minimum_overlap, datum.held_station(), (network.hold_m, patch_m))?;
+    let result = result(alone, adjusted, &start, &network, datum, patch_m);
     Ok(StationRegistration { placements, prepared: Arc::new(prepared), ..result })
 }
 
@@ -134,7 +131,7 @@ fn placements(stations: &[Cloud], points: Vec<StationPoints>, state: &State) -> 
 }
 
 fn result(
-    checked: Checked,
+    (pairs, loops): (Vec<PairAlignment>, Vec<LoopClosure>),
     adjusted: Adjusted,
     start: &[Isometry3<f64>],
     network: &Network<'_>,
@@ -151,9 +148,8 @@ fn result(
     StationRegistration {
         covariance: (0..count).map(|k| joint.between(k, k)).collect(),
         world_from_station: poses,
-        pairs: checked.pairs,
-        refused: checked.refused,
-        loops: checked.loops,
+        pairs,
+        loops,
         surfaces,
         placements: Placements::default(),
         undetermined,
@@ -228,7 +224,7 @@ fn shared(network: &Network<'_>, values: &[f64], joint: &nalgebra::DMatrix<f64>)
         if sigma > 0.0 { (values[k] - network.prior.0[k]) / sigma } else { 0.0 }
     };
     SharedParameters {
-        names: network.names.to_vec(),
+        names: network.names.clone(),
         values: values.to_vec(),
         covariance: (0..m).map(|r| (0..m).map(|c| joint[(first + r, first + c)]).collect()).collect(),
         prior: network.prior.0.clone(),

@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::places::search::Places;
 use crate::surfaces::patch_size;
 use crate::surfaces::patches::Surface;
-use crate::surfaces::point_model::{Prior, checked_prior};
+use crate::surfaces::point_model::checked_prior;
 use crate::surfaces::points::StationPoints;
 use crate::survey::datum::Datum;
 use crate::survey::registration::{Start, StationRegistrationOptions};
@@ -25,31 +25,10 @@ use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 
 /// How often those of many stations that fit better elsewhere are put there.
 const AGAIN: usize = 4;
-/// Rounds after which that is looked at: all but those settle in five to seven.
-const FEW_ROUNDS: usize = 8;
 /// Default of the error of approximate poses, in radii of the clouds.
 const START_ERROR: f64 = 0.2;
 /// The rounds end when no station moves by more than a patch over this: some hundredths of a millimetre.
 const TOLERANCE: f64 = 2000.0;
-
-/// What is known of the shared parameters beforehand, and their names.
-pub(crate) fn prior_of(options: &StationRegistrationOptions<'_>) -> Result<(Prior, Vec<String>)> {
-    match options.model {
-        Some(model) => Ok((checked_prior(model)?, model.names())),
-        None => Ok(<(Prior, Vec<String>)>::default()),
-    }
-}
-
-pub(crate) fn network<'a>(
-    datum: Datum,
-    radius_m: f64,
-    options: &StationRegistrationOptions<'a>,
-    (prior, names): (&'a Prior, &'a [String]),
-    whole: bool,
-) -> Network<'a> {
-    let fixed = datum.held_station();
-    Network { fixed, hold_m: radius_m, names, prior, turns: options.turns, whole }
-}
 
 /// Whether stations are adjusted as few are: all held against each other. Shared parameters couple them, and stations that were arranged by what
 /// they saw are not off each by itself.
@@ -58,7 +37,7 @@ pub(crate) fn is_whole(stations: usize, start: Start<'_>, options: &StationRegis
 }
 
 /// All stations adjusted, before anything is judged.
-pub(crate) struct Brought {
+pub(crate) struct Brought<'a> {
     pub adjusted: Adjusted,
     /// The poses that they began at.
     pub start: Vec<Isometry3<f64>>,
@@ -66,18 +45,18 @@ pub(crate) struct Brought {
     /// Verdicts on the stations where they are, if that was asked.
     pub placements: Option<Placements>,
     pub prepared: Vec<Surface>,
-    pub radius_m: f64,
+    pub network: Network<'a>,
     pub patch_m: f64,
 }
 
 /// Adjusts all stations from what is known of them.
-pub(crate) fn brought_together(
+pub(crate) fn brought_together<'a>(
     stations: &[Cloud],
     start: Start<'_>,
     datum: Datum,
-    (options, whole): (&StationRegistrationOptions<'_>, bool),
+    (options, whole): (&StationRegistrationOptions<'a>, bool),
     progress: &(dyn Fn(usize, usize) + Sync),
-) -> Result<Brought> {
+) -> Result<Brought<'a>> {
     let surfaces = prepare(stations, options)?;
     let patch_m = surfaces[0].size_m;
     let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
@@ -87,19 +66,23 @@ pub(crate) fn brought_together(
     };
     // Stations that were arranged by what they saw may have slid along walls together: they are not known better.
     let reach_m = options.start_error_m.unwrap_or(START_ERROR * radius_m);
-    let (prior, names) = prior_of(options)?;
-    let network = network(datum, radius_m, options, (&prior, &names), whole);
+    let (prior, names) = match options.model {
+        Some(model) => (checked_prior(model)?, model.names()),
+        None => Default::default(),
+    };
+    let fixed = datum.held_station();
+    let network = Network { fixed, hold_m: radius_m, names, prior, turns: options.turns, whole };
     let total = |done| progress(done, MOST_ROUNDS);
     let wide_rounds = WideRounds { network: &network, reach_m, progress: &total };
     let mut modelled = Surfaces::fixed(surfaces.iter().collect());
     modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));
-    let mut near = wide_rounds.run(&mut modelled, &State { poses: start.clone(), parameters: prior.0.clone() })?;
+    let mut near =
+        wide_rounds.run(&mut modelled, &State { poses: start.clone(), parameters: network.prior.0.clone() })?;
     let moved = if whole { Isometry3::identity() } else { framed(&mut near, network.fixed, &start[network.fixed]) };
     let mut finish = Finish {
         network: &network,
         near: Known::at(patch_m / 2.0, radius_m),
         tolerance_m: patch_m / TOLERANCE,
-        most_rounds: if whole { MOST_ROUNDS } else { FEW_ROUNDS },
         progress: &total,
         joints: Vec::new(),
     };
@@ -121,7 +104,8 @@ pub(crate) fn brought_together(
         Some((modelled, _)) => modelled,
         None => surfaces,
     };
-    Ok(Brought { adjusted, start, points, placements, prepared, radius_m, patch_m })
+    adjusted.factor = adjusted.factor_of_wide_errors();
+    Ok(Brought { adjusted, start, points, placements, prepared, network, patch_m })
 }
 
 /// The stations as patches, all of one size.
@@ -169,12 +153,11 @@ impl Again<'_> {
                 let mut placements = judge_placements(self.stations, &adjusted.state.poses)?;
                 let doubtful = places.looked_through.doubtful(&adjusted.state.poses);
                 placements.doubt(moved.into_iter().chain(doubtful));
-                return Ok((adjusted.with_factor(), Some(placements)));
+                return Ok((adjusted, Some(placements)));
             }
             let mut state = State { poses, ..adjusted.state.clone() };
             let fixed = finish.network.fixed;
             framed(&mut state, fixed, &adjusted.state.poses[fixed]);
-            finish.most_rounds = if moved.is_empty() && !is_new { MOST_ROUNDS } else { FEW_ROUNDS };
             adjusted = finish.run(modelled, points, state)?;
             last = Some(moved);
         }

@@ -13,8 +13,8 @@ fn the_derivative_of_a_contact_agrees_with_differences() {
     let cloud = Cloud::new(points);
     let surface = Surface::new(&cloud, &vec![Vector3::z(); 900], 0.1).unwrap();
     let pose = Isometry3::new(Vector3::new(0.01, -0.02, 0.03), Vector3::new(0.02, 0.01, -0.03));
-    let contact = Contact { source: 3, target: 3, asked_by_source: true, share: 0.5 };
-    let at = |pose: &Isometry3<f64>| observe(&surface, &surface, &contact, pose);
+    let contact = Contact { source: 3, target: 3 };
+    let at = |pose: &Isometry3<f64>| observe(&surface, &surface, contact, pose);
     let here = at(&pose);
     for k in 0..6 {
         let mut step = Vector6::zeros();

@@ -9,13 +9,13 @@ fn pairs_are_those_that_trying_all_finds() {
     let mut boxes: Vec<Extent> = (0..300).map(of).collect();
     boxes[7] = Extent::of(std::iter::empty());
     boxes[9] = Extent::about(&Vector3::zeros(), 100.0);
-    let found = Extents::new(&boxes).pairs(0.7);
+    let found = Extent::pairs(&boxes, 0.7);
     let all = (0..300).flat_map(|a| (a + 1..300).map(move |b| (a, b)));
     let expected: Vec<(usize, usize)> = all.filter(|&(a, b)| boxes[a].meets(&boxes[b], 0.7)).collect();
     assert!(expected.len() > 500 && expected.len() < 10_000, "{}", expected.len());
     assert_eq!(found, expected);
     assert!(!found.iter().any(|&(a, b)| a == 7 || b == 7), "nothing lies nowhere");
-    assert!(Extents::new(&[]).pairs(1.0).is_empty());
+    assert!(Extent::pairs(&[], 1.0).is_empty());
 }
 
 #[test]

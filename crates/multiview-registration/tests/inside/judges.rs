@@ -1,8 +1,6 @@
 //! Looks at few pairs against looks at all.
 #![allow(clippy::unwrap_used)]
 
-use statistics::upper_median;
-
 use super::*;
 
 /// The definition: sums over all pairs, and the median of all others.

@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 use rigid_pose::step_pose;
+
+use crate::relative_pose::relative_pose_parts;
 
 use super::*;
 
@@ -20,14 +22,19 @@ fn derivatives_of_a_turn_agree_with_differences() {
         first_from_second: poses[0].rotation.inverse() * poses[1].rotation * off,
         covariance: Matrix3::new(4.0, 1.0, 0.0, 1.0, 3.0, 0.5, 0.0, 0.5, 2.0) * 1e-4,
     };
-    let (_, by) = turn.linearised(&poses).unwrap();
+    let linearised = |poses: &[Isometry3<f64>; 2]| {
+        let RelativePose { first_from_second, rows, .. } = turn.observed(poses).unwrap();
+        let (v, by) = relative_pose_parts(&first_from_second, &poses[0], &poses[1]);
+        (-&rows * v, by.map(|by| &rows * by))
+    };
+    let (_, by) = linearised(&poses);
     for station in 0..2 {
         for axis in 0..6 {
             let moved = |step: f64| {
                 let mut moved = poses;
                 moved[station] =
                     step_pose(&poses[station], &Vector6::from_fn(|k, _| if k == axis { step } else { 0.0 }));
-                turn.linearised(&moved).unwrap().0
+                linearised(&moved).0
             };
             let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
             assert!((difference - by[station].column(axis)).norm() < 1e-5, "{station} {axis}");

@@ -72,7 +72,7 @@ pub struct Summary {
 pub struct RegistrationSummary {
     /// Pairs of stations that were aligned.
     pub pairs: Vec<PairSummary>,
-    /// Pairs that overlap and were left out, each with its reason.
+    /// Pairs of frames that overlap and were left out, each with its reason.
     pub refused: Vec<String>,
     /// A-posteriori standard deviation of unit weight of the simultaneous adjustment.
     pub sigma0: Option<f64>,

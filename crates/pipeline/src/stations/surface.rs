@@ -114,7 +114,7 @@ impl Surface {
     /// looks at. `None` where there is no surface.
     pub fn distance(&self, point: &Point3<f64>, rms_m: f64) -> Option<f64> {
         let reach = (RESIDUAL_REACH * rms_m).max(SPACING_REACH * self.target.spacing_m());
-        let nearest = self.target.tree().nearest_within(point, reach).ok()??;
+        let nearest = self.target.tree().nearest(point).ok().filter(|nearest| nearest.distance_m <= reach)?;
         let (at, normal) = (self.target.cloud().points[nearest.index], self.target.normals()[nearest.index]);
         let across = normal.dot(&(point - at));
         let side = if normal.dot(&at.coords) > 0.0 { -across } else { across };

@@ -107,11 +107,6 @@ fn summary(
     RegisterSummary {
         stations: rows,
         pairs: result.surfaces.iter().map(|pair| row(pair, &alone, stations)).collect(),
-        refused: result
-            .refused
-            .iter()
-            .map(|p| format!("{} onto {}: {}", name(p.source), name(p.target), p.reason))
-            .collect(),
         loops: closures.collect(),
         sigma0: result.sigma0,
         redundancy: Some(result.redundancy),

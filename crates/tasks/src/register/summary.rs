@@ -21,7 +21,7 @@ pub struct RegisterSummary {
     pub stations: Vec<RegisteredStation>,
     /// Pairs of stations that were held together.
     pub pairs: Vec<RegisteredPair>,
-    /// Pairs that overlap and were left out, each with its reason.
+    /// Pairs of frames that overlap and were left out, each with its reason.
     pub refused: Vec<String>,
     /// How loops of pairs fail to close.
     pub loops: Vec<RegisteredLoop>,

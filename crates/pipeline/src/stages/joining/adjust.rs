@@ -50,7 +50,7 @@ fn again(joined: &mut Joined, options: &AdjustOptions, progress: &dyn Progress) 
     let found = register_at_once(&joined.clouds, Start::Poses(&initial), limits, &[], progress);
     let tried = Tried::Poses(Some(options.maximum_distance_m));
     let found = found.map_err(|error| refused::of_stage("Adjust", error, &joined.names, tried))?;
-    let (adjusted, pairs, refused) = Registered::new(found, &Isometry3::identity(), options.minimum_overlap);
-    (joined.pairs, joined.refused) = (pairs, refused);
+    let (adjusted, pairs) = Registered::new(found, &Isometry3::identity(), options.minimum_overlap);
+    joined.pairs = pairs;
     Ok(adjusted)
 }

@@ -28,7 +28,7 @@ pub(crate) struct Joined {
     pub(crate) left_out: Vec<UnplacedFrame>,
     /// Aligned pairs.
     pub(crate) pairs: Vec<PairAlignment>,
-    /// Pairs that overlap but could not be aligned reliably.
+    /// Pairs of frames that overlap but could not be aligned reliably.
     pub(crate) refused: Vec<RefusedPair>,
     /// Pairs of frames that nothing checks.
     pub(crate) unchecked: Vec<UncheckedPair>,
@@ -57,20 +57,16 @@ pub(crate) struct Registered {
 }
 
 impl Registered {
-    /// Moved into the world, with the pairs and those that were left out.
+    /// Moved into the world, with the pairs.
     pub(crate) fn new(
         found: StationRegistration,
         world_from_registered: &Isometry3<f64>,
         minimum_overlap: f64,
-    ) -> (Self, Vec<PairAlignment>, Vec<RefusedPair>) {
+    ) -> (Self, Vec<PairAlignment>) {
         let poses = poses_in(world_from_registered, &found).into_iter().map(Some).collect();
         let StationRegistration { sigma0, redundancy, placements, rounds, settled, .. } = found;
         let figures = AdjustmentFigures { sigma0, redundancy, placements };
         let surfaces = found.surfaces.len();
-        (
-            Self { poses, minimum_overlap: Some(minimum_overlap), surfaces, rounds, settled, figures },
-            found.pairs,
-            found.refused,
-        )
+        (Self { poses, minimum_overlap: Some(minimum_overlap), surfaces, rounds, settled, figures }, found.pairs)
     }
 }

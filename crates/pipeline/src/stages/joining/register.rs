@@ -70,10 +70,10 @@ fn at_once(
     }
     let found = found.map_err(|error| refused::of_stage("Register", error, &names, tried))?;
     let world = world(stated, found.world_from_station.first());
-    let (registered, pairs, refused) = Registered::new(found, &world, options.minimum_overlap);
+    let (registered, pairs) = Registered::new(found, &world, options.minimum_overlap);
     let poses = without_covariances(&registered.poses);
     let registered = matches!(start, Start::Poses(_)).then_some(registered);
-    Ok(Joined { poses, pairs, refused, registered, names, clouds, ..Joined::default() })
+    Ok(Joined { poses, pairs, registered, names, clouds, ..Joined::default() })
 }
 
 /// How well poses are known is what `Adjust` says.

@@ -166,8 +166,6 @@ pub(crate) struct Pairs {
     pub variance: [f32; BLOCK],
     /// Weight of the robust kernel, between 0 and 1, over the variance.
     pub weight: [f32; BLOCK],
-    /// Whether the point falls on a target plane at all.
-    pub met: [bool; BLOCK],
     /// Slope of the kernel's influence over the variance.
     pub slope: [f32; BLOCK],
 }
@@ -215,7 +213,7 @@ impl<'a> Moved<'a> {
         let (centre, per_radius, rules) = (self.centre, self.per_radius, self.rules);
         let (extra_variance, per_square_reach) = (rules.extra_variance, 1.0 / (rules.reach * rules.reach));
         let nothing = [0.0; BLOCK];
-        let (mut accepted, mut met) = ([false; BLOCK], [false; BLOCK]);
+        let mut accepted = [false; BLOCK];
         let (mut variance, mut weight, mut slope, mut residual) = (nothing, nothing, nothing, nothing);
         for k in 0..BLOCK {
             variance[k] = distances.variance[k] + extra_variance;
@@ -223,7 +221,6 @@ impl<'a> Moved<'a> {
             let u2 = distances.residual[k] * distances.residual[k] * information * per_square_reach;
             // NaN fails: no partner.
             accepted[k] = (distances.cosine[k] >= LEAST_COSINE) & (u2 < 1.0);
-            met[k] = u2 >= 0.0;
             let rest = 1.0 - u2;
             let (by_weight, by_slope) = (rest * rest * information, rest * (1.0 - 5.0 * u2) * information);
             weight[k] = if accepted[k] { by_weight } else { 0.0 };
@@ -238,7 +235,7 @@ impl<'a> Moved<'a> {
         }
         let normal = taken(&[planes[0], planes[1], planes[2]], &accepted);
         let (lever, source_normal) = (taken(&lever, &accepted), taken(&source_normal, &accepted));
-        Pairs { normal, source_normal, lever, residual, variance, weight, met, slope }
+        Pairs { normal, source_normal, lever, residual, variance, weight, slope }
     }
 
     /// Where the nodes of a block lie for the target.

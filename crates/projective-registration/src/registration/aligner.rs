@@ -7,10 +7,9 @@ use crate::error::Result;
 use crate::options::FrameAlignmentOptions;
 use crate::partners::pairs::Rules;
 use crate::partners::sums::{SUMS, median_residual, normal_equations};
-use crate::partners::track::{FEWEST_POINTS, Frames, Track, is_within_noise};
+use crate::partners::track::{Frames, LAST_LEVEL, Track, is_within_noise};
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
-use crate::preparation::grid::STRIDES;
 use crate::registration::quality::{Cell, Verdict};
 use crate::shared_error::Sighting;
 use icp_registration::{IcpResult, StopReason, TUKEY};
@@ -23,7 +22,7 @@ pub(crate) const FEWEST_PAIRS: usize = 20;
 /// Residuals from which scales are taken.
 pub(crate) const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.
-pub(crate) const COARSE_ITERATIONS: usize = 8;
+const COARSE_ITERATIONS: usize = 8;
 /// First steps, which are least squares over all that is in reach.
 const WIDE_ITERATIONS: usize = 3;
 /// Coarse levels end when a step is below this, in units of the radius.
@@ -86,31 +85,20 @@ impl FrameAligner {
         let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
         let first = self.follow_levels(track.clone(), frames);
-        if self.options.other_starts == 0 {
-            return first.map(|(_, result)| result);
-        }
-        self.searched(first, &track, frames)
-    }
-
-    /// The first level that is passed; none where all but the last have too few nodes.
-    pub(crate) fn first_level(&self, frames: Frames<'_>) -> Option<usize> {
-        let coarsest = STRIDES.len() - self.options.levels;
-        (coarsest..STRIDES.len() - 1).find(|level| frames.source.points.counts[*level] >= FEWEST_POINTS)
+        if self.options.search { self.searched(first, &track, frames) } else { first.map(|(_, result)| result) }
     }
 
     /// The whole way from the guess.
     fn follow_levels(&mut self, mut track: Track, frames: Frames<'_>) -> Result<(Track, IcpResult)> {
-        match self.first_level(frames) {
-            Some(first) => track = self.start(&track, frames, frames.blocks(first))?,
-            None => self.open(&mut track, frames, frames.all_blocks())?,
-        }
-        self.approach(&mut track, frames)?;
+        let first = frames.first_level();
+        self.open(&mut track, frames, frames.blocks(first))?;
+        self.approach(&mut track, frames, first)?;
         self.end(track, frames)
     }
 
-    /// The levels between the first and the last.
-    pub(crate) fn approach(&mut self, track: &mut Track, frames: Frames<'_>) -> Result<()> {
-        for level in self.first_level(frames).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
+    /// The levels from one on, but for the last.
+    pub(crate) fn approach(&mut self, track: &mut Track, frames: Frames<'_>, first: usize) -> Result<()> {
+        for level in first..LAST_LEVEL {
             self.descend(track, frames, frames.blocks(level), COARSE_ITERATIONS)?;
         }
         Ok(())

@@ -3,17 +3,33 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::partners::track::{Frames, Track};
+use crate::partners::track::{Frames, LAST_LEVEL, Track};
 use crate::registration::aligner::FrameAligner;
 use crate::registration::consistency::{DOUBT_LEVEL, TOLERANCE, consistency};
 use crate::registration::search::weighed;
-use crate::registration::starts::{TURN_RAD, TURNS};
 use icp_registration::{MotionKind, UndeterminedMotion};
 
-/// Starts: turned by the angle of the first other starts or about twice of it, and shifted in units of the radius.
+/// Starts around the guess: turned by this angle, or about twice of it, and shifted in units of the radius.
+const TURN_RAD: f64 = 0.26;
 const WIDE_TURN_RAD: f64 = 0.5;
 const SHIFT: f64 = 0.22;
-/// Turns that are tried by the wide angle as well.
+/// Axes of the turns in the source's frame, and how many of them are tried by the wide angle as well.
+const TURNS: [[f64; 3]; 14] = [
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [1.0, 1.0, 0.0],
+    [-1.0, 1.0, 0.0],
+    [1.0, -1.0, 0.0],
+    [-1.0, -1.0, 0.0],
+    [0.0, 1.0, 1.0],
+    [0.0, 1.0, -1.0],
+    [0.0, -1.0, 1.0],
+    [0.0, -1.0, -1.0],
+];
 const WIDE_TURNS: usize = 6;
 /// Iterations from each start.
 const ITERATIONS: usize = 4;
@@ -76,7 +92,10 @@ impl FrameAligner {
     /// Passes the first level from starts all around the guess and keeps the places where the frames agree best.
     pub(crate) fn look_around(&self, start: &Track, frames: Frames<'_>) -> Places {
         let mut places = Places::default();
-        let Some(level) = self.first_level(frames) else { return places };
+        let level = frames.first_level();
+        if level == LAST_LEVEL {
+            return places;
+        }
         let radius = frames.radius_m();
         // Each start on an aligner of its own: what comes out does not hang on the threads.
         let followed = starts(&start.pose, radius).into_par_iter().map_with(self.clone(), |aligner, pose| {

@@ -56,8 +56,8 @@ impl Verdict {
         let score = if used >= FEWEST_CELLS {
             clustered(cells) * (used as f64 / (used as f64 - 6.0))
         } else {
-            // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            independent_scores(moved, blocks) * (normal.pairs as f64 / used.max(1) as f64)
+            // Too few cells to estimate from: pairs as uncertain as their nodes, those of a cell fully dependent.
+            normal.equations.matrix * (normal.pairs as f64 / used.max(1) as f64)
         };
         // Frames that are copies of each other leave no residuals: their noise is still that of their nodes.
         let missing = (LEAST_SCORE - score.trace() / normal.equations.matrix.trace()).max(0.0);
@@ -133,27 +133,6 @@ fn form(upper: &[f64], v: &Vector6<f64>) -> f64 {
         }
     }
     sum
-}
-
-/// Covariance of the summed score of pairs that share nothing.
-fn independent_scores(moved: &Moved<'_>, blocks: &[Block]) -> Matrix6<f64> {
-    let mut sums = [0.0; 21];
-    sums::visit(moved, blocks, |pairs| {
-        let rows = derivatives(&pairs.lever, &pairs.normal);
-        let mut k = 0;
-        for r in 0..6 {
-            for c in r..6 {
-                let mut lane = [0.0_f32; BLOCK];
-                for l in 0..BLOCK {
-                    let score = pairs.weight[l] * pairs.residual[l];
-                    lane[l] = rows[r][l] * rows[c][l] * score * score;
-                }
-                sums[k] += f64::from(sums::across(&lane));
-                k += 1;
-            }
-        }
-    });
-    symmetric(&sums)
 }
 
 /// Sums over the cells, and the normal equations.

@@ -64,7 +64,7 @@ impl FrameAligner {
         // Each place on an aligner of its own: what comes out does not hang on the threads.
         let approached = places.into_par_iter().map_with(self.clone(), |aligner, place| {
             let mut track = place.clone();
-            aligner.approach(&mut track, frames).ok().map(|()| (merit(&track.pose), track))
+            aligner.approach(&mut track, frames, frames.first_level() + 1).ok().map(|()| (merit(&track.pose), track))
         });
         let approached: Vec<Option<(f64, Track)>> = approached.collect();
         let most = best.as_ref().map_or(0.0, |(_, result)| merit(&result.target_from_source));

@@ -13,6 +13,8 @@ use icp_registration::StopReason;
 /// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
 /// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
 const COARSE_FRACTION: f64 = 1.0;
+/// Length of a step, in units of the radius, at which the pose stands: far below every noise.
+const SMALL_STEP: f64 = 1e-5;
 /// Steps before which the reach of the kernel is set.
 const NARROWINGS: usize = 3;
 /// Steps after which it is first seen whether the pose has got anywhere, and then after twice as many as before: where nodes
@@ -50,7 +52,7 @@ impl FrameAligner {
             if *narrowings > 0 {
                 continue;
             }
-            let tolerance = self.options.step_tolerance_m.unwrap_or(1e-5 * frame.radius_m);
+            let tolerance = SMALL_STEP * frame.radius_m;
             if step <= tolerance || track.over_sigma <= over_sigma {
                 return Ok(StopReason::Converged);
             }

@@ -26,11 +26,9 @@ const FEWEST_CONSENTING: f64 = 0.6;
 const LEAST_OVERLAP: f64 = 0.5;
 /// Planes it must share: three make a corner, and corners look alike.
 const LEAST_PLANES: usize = 4;
-/// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, as a standard
-/// deviation: what is carried elsewhere is carried farther.
-const JUMP: f64 = 0.01;
-/// The same of a camera whose velocity is not known.
-const START: f64 = 0.05;
+/// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, or go where its velocity is not known,
+/// as a standard deviation: what is carried elsewhere is carried farther.
+const JUMP: f64 = 0.05;
 
 /// A registration that passed its tests.
 #[derive(Debug, Clone, Copy)]
@@ -172,7 +170,7 @@ impl Tracker {
         }
         let others = |k: usize| k != reference;
         let pose = &prediction.own.pose;
-        let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
+        let candidates = self.keyframes.candidates(&self.current, reference, pose, others);
         // In a stream that does not wait, a lost frame tries one of them, in turn.
         let one = self.is_beside() && last.lost_frames > 0;
         let (passed, tried) = if one { (last.lost_frames % NEIGHBOURS, 1) } else { (0, NEIGHBOURS) };
@@ -234,9 +232,8 @@ impl Tracker {
     fn expects(&self, own: &Uncertain, prediction: &Prediction, lost_frames: usize) -> bool {
         let radius = self.current.radius_m();
         let ungrounded = prediction.grounds == Grounds::Nothing;
-        let jump = if ungrounded { START } else { JUMP };
         let known = if ungrounded { Matrix6::zeros() } else { prediction.own.covariance };
-        let covariance = known + diagonal([(jump * radius).powi(2), jump * jump]);
+        let covariance = known + diagonal([(JUMP * radius).powi(2), JUMP * JUMP]);
         let reachable = Uncertain { covariance, ..prediction.own };
         let relied_on = !ungrounded && prediction.own.sigma_at(radius) <= Self::carried_sigma_m(prediction.grounds);
         (lost_frames == 0 || relied_on) && own.mahalanobis_squared(&reachable).is_some_and(is_likely)
@@ -258,11 +255,6 @@ impl Tracker {
             && self.current.agreement(keyframe, &pose.inverse(), Agreement::NODES).consent() >= Agreement::LEAST_CONSENT
             && keyframe.shared_planes(&self.current, pose, Agreement::NODES) >= LEAST_PLANES
     }
-}
-
-/// Fraction of a frame that agrees with another within the noise.
-pub(crate) fn agreeing(target: &OrganisedFrame, source: &OrganisedFrame, pose: &Isometry3<f64>, most: usize) -> f64 {
-    target.agreement(source, pose, most).overlap()
 }
 
 /// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.

@@ -27,9 +27,7 @@ pub struct FrameAlignmentOptions {
 }
 
 impl FrameAlignmentOptions {
-    /// Share of the radius beyond whose standard deviation a motion is undetermined.
-    pub const OPEN: f64 = icp_registration::quality::OPEN;
-    /// The same where many registrations are put together: poses that
+    /// Share of the radius beyond whose standard deviation a motion is undetermined where many registrations are put together: poses that
     /// are centimetres weak for a moment have little weight there, and are worth more than none.
     pub const OPEN_IN_A_GRAPH: f64 = 1.0 / 50.0;
 }

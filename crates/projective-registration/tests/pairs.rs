@@ -242,12 +242,12 @@ fn a_start_far_off_at_half_overlap_is_found() {
         assert!(is_good || !result.is_trustworthy(), "pair {k}: {mm} mm, {degrees} degrees");
         good += u32::from(is_good);
         // At the truth the frames hardly contradict each other.
-        let there = frame_consistency(&source, &target, &truth, 2, None);
+        let there = frame_consistency(&source, &target, &truth, 2);
         assert!((there.contradicting + there.unclear) * 50 < there.compared(), "pair {k}: {there:?}");
         assert!(there.agreeing * 3 > there.all(), "pair {k}: {there:?}");
         // Half a metre towards what is seen, surfaces stand where the other camera saw through.
         let wrong = truth * Isometry3::translation(0.0, 0.0, 0.5);
-        let there = frame_consistency(&source, &target, &wrong, 2, None);
+        let there = frame_consistency(&source, &target, &wrong, 2);
         assert!(there.contradicting * 5 > there.compared(), "pair {k}: {there:?}");
     }
     // Nine of ten over two hundred pairs.

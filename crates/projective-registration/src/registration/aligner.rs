@@ -12,13 +12,10 @@ use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::quality::{Cell, Verdict};
 use crate::shared_error::Sighting;
-use icp_registration::{IcpResult, StopReason, TUKEY};
+use icp_registration::quality::{FEWEST_PAIRS, OPEN};
+use icp_registration::{IcpResult, StopReason};
 use rigid_pose::{Centred, InputError, require_pose, symmetrised};
 
-/// Of the biweight.
-pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
-/// Fewest pairs, and nodes of a frame, that a pose is told by: three an unknown and two more. Frames that overlap have hundreds.
-pub(crate) const FEWEST_PAIRS: usize = 20;
 /// Residuals from which scales are taken.
 pub(crate) const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.
@@ -81,7 +78,7 @@ impl FrameAligner {
                 return Err(InputError::TooFewPoints { what, found: frame.len(), needed: FEWEST_PAIRS }.into());
             }
         }
-        let rules = Rules { extra_variance: 0.0, reach: BIWEIGHT };
+        let rules = Rules { extra_variance: 0.0, widening: 1.0 };
         let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
         let first = self.follow_levels(track.clone(), frames);
@@ -136,7 +133,7 @@ impl FrameAligner {
                 break;
             }
             let wide = track.iterations < WIDE_ITERATIONS;
-            track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
+            track.rules.widening = if wide { 3.0 } else { 1.0 };
             let (step, frame) = self.step(track, frames, blocks, 1e-4)?;
             if !wide {
                 self.narrow(track, frames, blocks);
@@ -180,7 +177,7 @@ impl FrameAligner {
     /// What the pairs of some nodes say about the pose.
     pub(crate) fn verdict(&mut self, track: &Track, frames: Frames<'_>, blocks: &[Block]) -> Result<Verdict> {
         let (moved, frame) = frames.moved(track);
-        let limit_m = self.options.max_motion_sigma_m.unwrap_or(FrameAlignmentOptions::OPEN * frame.radius_m);
+        let limit_m = self.options.max_motion_sigma_m.unwrap_or(OPEN * frame.radius_m);
         Verdict::new(&moved, blocks, limit_m, &mut self.cells)
     }
 
@@ -193,7 +190,7 @@ impl FrameAligner {
             pose = frame.moved(&pose, &normal.equations.step(&track.free, 0.0)?);
         }
         let to_tangent = frame.tangent_from_motion(&pose);
-        let centred = verdict.covariance(frame.radius_m);
+        let centred = verdict.directions.covariance(frame.radius_m, None);
         let stop = if stop == StopReason::MaxIterations && is_within_noise(&track.last_step, &centred) {
             StopReason::WithinNoise
         } else {
@@ -207,8 +204,9 @@ impl FrameAligner {
             iterations: track.iterations,
             stop,
             correspondences: normal.pairs,
-            max_correspondence_distance_m: f64::from(track.rules.reach) * (normal.pairs as f64 / normal.weight).sqrt(),
-            degenerate: verdict.undetermined(&frame),
+            max_correspondence_distance_m: f64::from(track.rules.reach())
+                * (normal.pairs as f64 / normal.weight).sqrt(),
+            degenerate: verdict.directions.undetermined(&frame),
         })
     }
 
@@ -217,7 +215,7 @@ impl FrameAligner {
             found,
             of,
             needed: FEWEST_PAIRS,
-            max_distance_m: f64::from(track.rules.reach * track.rules.extra_variance.sqrt()),
+            max_distance_m: f64::from(track.rules.reach() * track.rules.extra_variance.sqrt()),
             iteration: track.iterations,
         }
     }

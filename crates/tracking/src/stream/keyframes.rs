@@ -13,8 +13,8 @@ use rigid_pose::Uncertain;
 
 /// Fields of the thumbnails.
 pub(crate) const THUMBNAIL: [usize; 2] = [16, 12];
-/// Keyframes whose overlap with a frame is told.
-const CANDIDATES: usize = 4;
+/// Keyframes that a frame is tried with where its own is not enough, those that should see most of the same, or look most like it.
+pub(crate) const CANDIDATES: usize = 4;
 
 /// A frame that others are registered with.
 #[derive(Debug, Clone)]

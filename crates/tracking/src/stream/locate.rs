@@ -5,16 +5,16 @@ use nalgebra::{Isometry3, Matrix6, Vector6};
 use crate::motion_model::motion::diagonal;
 use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
+use crate::stream::keyframes::CANDIDATES;
 use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
 use pose_graph::{Relation, is_likely};
+use projective_registration::icp_registration::quality::OPEN;
 use projective_registration::{
-    Agreement, ByField, Error as FrameError, Field, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame,
+    Agreement, ByField, Error as FrameError, Field, FrameAligner, Influence, OrganisedFrame,
 };
 use rigid_pose::{InputError, Uncertain, step_pose, symmetrised};
 
-/// Keyframes tried beside the reference.
-const NEIGHBOURS: usize = 2;
 /// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
 const BY_VELOCITY: f64 = 0.25;
 /// Where a frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard deviation at the
@@ -50,7 +50,7 @@ pub(crate) struct Measured {
 impl Measured {
     /// Whether the geometry determines all motions well, and nothing speaks against the pose.
     fn is_firm(&self, radius_m: f64) -> bool {
-        self.is_sound() && self.pose.sigma_at(radius_m) <= FrameAlignmentOptions::OPEN * radius_m
+        self.is_sound() && self.pose.sigma_at(radius_m) <= OPEN * radius_m
     }
 
     /// Whether the frames agree at the pose as they do at right ones. Frames that have slid along a wall fit as well, and
@@ -71,9 +71,7 @@ impl Measured {
         let scale = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, radius_m, radius_m, radius_m));
         let back = Matrix6::from_diagonal(&scale.diagonal().map(|s| 1.0 / s));
         let mut motions = symmetrised(&(scale * self.pose.covariance * scale)).symmetric_eigen();
-        for variance in
-            motions.eigenvalues.iter_mut().filter(|v| **v > (FrameAlignmentOptions::OPEN * radius_m).powi(2))
-        {
+        for variance in motions.eigenvalues.iter_mut().filter(|v| **v > (OPEN * radius_m).powi(2)) {
             *variance = variance.max(radius_m * radius_m);
         }
         let covariance = symmetrised(&(back * motions.recompose() * back));
@@ -173,7 +171,7 @@ impl Tracker {
         let candidates = self.keyframes.candidates(&self.current, reference, pose, others);
         // In a stream that does not wait, a lost frame tries one of them, in turn.
         let one = self.is_beside() && last.lost_frames > 0;
-        let (passed, tried) = if one { (last.lost_frames % NEIGHBOURS, 1) } else { (0, NEIGHBOURS) };
+        let (passed, tried) = if one { (last.lost_frames % CANDIDATES, 1) } else { (0, CANDIDATES) };
         for (_, k) in candidates.into_iter().skip(passed).take(tried) {
             let guess = self.keyframes.graph.relative(k, reference) * prediction.own.pose;
             if let Ok(measured) = self.try_keyframe(k, &guess)

@@ -5,13 +5,11 @@ use nalgebra::{Isometry3, UnitQuaternion};
 
 use crate::options::Relocalisation;
 use crate::stream::beside::Found;
-use crate::stream::keyframes::THUMBNAIL;
+use crate::stream::keyframes::{CANDIDATES, THUMBNAIL};
 use crate::stream::locate::Measured;
 use crate::stream::tracker::Tracker;
 use projective_registration::thumbnail_difference;
 
-/// Keyframes that are tried from the look of their thumbnails.
-const TRIED: usize = 3;
 /// Shifts of the thumbnails to each side, fields.
 const SHIFTS: [isize; 2] = [5, 3];
 
@@ -27,7 +25,7 @@ impl Tracker {
 
     /// The current frame from the keyframes that look most like it.
     pub(crate) fn alike(&mut self, ranked: &[(f32, usize, Isometry3<f64>)]) -> Option<Measured> {
-        let tried = if self.is_beside() { 1 } else { TRIED };
+        let tried = if self.is_beside() { 1 } else { CANDIDATES };
         ranked.iter().take(tried).find_map(|(_, k, guess)| self.verified(*k, guess))
     }
 

@@ -106,7 +106,7 @@ pub(crate) struct Rules {
 
 impl Rules {
     /// Residuals beyond this multiple of their standard deviation have no weight.
-    pub(crate) fn reach(&self) -> f32 {
+    pub(crate) fn reach(self) -> f32 {
         self.widening * TUKEY as f32
     }
 }

@@ -92,7 +92,7 @@ fn pairs(name: &str, sequence: &Sequence, options: &CoarseOptions, each: bool) -
 /// Share of the surface of both frames that the other one sees, the smaller one.
 fn overlap(source: &OrganisedFrame, target: &OrganisedFrame, target_from_source: &Isometry3<f64>) -> f64 {
     let of = |a: &OrganisedFrame, b: &OrganisedFrame, pose: &Isometry3<f64>| {
-        let found = frame_consistency(a, b, pose, 4, None);
+        let found = frame_consistency(a, b, pose, 4);
         found.compared() as f64 / found.all().max(1) as f64
     };
     of(source, target, target_from_source).min(of(target, source, &target_from_source.inverse()))

@@ -11,7 +11,7 @@ mod target;
 mod voxels;
 
 pub use error::Error;
-pub use icp::{Alternative, IcpOptions, Levels, Metric, Registration, Settled, Starts, align};
+pub use icp::{Alternative, IcpOptions, Levels, Metric, Registration, Starts, align};
 pub use kernel::{RobustKernel, TUKEY};
 pub use nalgebra;
 pub use parts::Selection;

@@ -7,11 +7,12 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector6};
 use rayon::prelude::*;
 use statistics::{CHI_MEDIANS, mad_scale, upper_median};
 
-use crate::icp::engine::matching::CHUNK;
 use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, Pair, Row, Rows, Scene};
 use rigid_pose::{Centred, MotionEquations};
 
+/// Points, pairs or voxels handled together by one thread; fixed, so that sums do not depend on the number of threads.
+pub(crate) const CHUNK: usize = 512;
 /// Scale of lengths, in radii, below which they count as exact beside another channel.
 const SMALLEST_LENGTH: f64 = 1e-4;
 
@@ -106,11 +107,7 @@ impl<'a> System<'a> {
             }
             equations
         };
-        let partial: Vec<MotionEquations> = starts.par_iter().map(chunk).collect();
-        partial.into_iter().fold(MotionEquations::default(), |mut sum, equations| {
-            sum += equations;
-            sum
-        })
+        starts.par_iter().map(chunk).collect::<Vec<_>>().into_iter().sum()
     }
 
     /// Weighted sum of squares of the same pairs after a motion.

@@ -12,8 +12,8 @@ use point_cloud::NeighbourTree;
 use point_cloud::{UnorganisedNormalOptions, normals_with_tree};
 use rigid_pose::Centred;
 
-/// Points whose distance to their neighbour is looked at for the spacing.
-const SPACING_SAMPLES: usize = 2000;
+/// Points from which a typical distance is taken, and the share of those with a partner.
+pub(crate) const SAMPLES: usize = 2000;
 
 /// A cloud prepared as target.
 #[derive(Debug)]
@@ -76,8 +76,8 @@ impl IcpTarget {
 }
 
 fn spacing(cloud: &Cloud, tree: &NeighbourTree) -> Result<f64> {
-    let stride = cloud.len().div_ceil(SPACING_SAMPLES);
-    let mut distances = Vec::with_capacity(SPACING_SAMPLES);
+    let stride = cloud.len().div_ceil(SAMPLES);
+    let mut distances = Vec::with_capacity(SAMPLES);
     for point in cloud.points.iter().step_by(stride) {
         distances.extend(tree.k_nearest(point, 2)?.get(1).map(|n| n.distance_m));
     }

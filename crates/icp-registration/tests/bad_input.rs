@@ -130,10 +130,8 @@ fn options_and_guesses_outside_their_domain() {
         IcpOptions { trim: 0.0, ..default() },
         IcpOptions { trim: f64::NAN, ..default() },
         IcpOptions { max_iterations: 0, ..default() },
-        IcpOptions { min_correspondences: 0, ..default() },
         IcpOptions { max_correspondence_distance_m: Some(-1.0), ..default() },
         IcpOptions { initial_correspondence_distance_m: Some(f64::NAN), ..default() },
-        IcpOptions { max_normal_angle_rad: Some(0.0), ..default() },
         IcpOptions { selection: Selection::EveryNth(0), ..default() },
         IcpOptions { selection: Selection::NormalSpace(0), ..default() },
     ] {

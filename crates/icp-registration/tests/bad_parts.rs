@@ -88,7 +88,7 @@ proptest! {
         if let (1, Ok(mesh)) = (matching_kind, &mesh) {
             registration.matching = Box::new(icp_registration::parts::ClosestOnMesh::new(mesh));
         }
-        registration.stopping.max_iterations = 30;
+        registration.max_iterations = 30;
         if extras & 1 != 0 { registration.kernel = RobustKernel::Tukey; }
         if extras & 2 != 0 { registration.rejection.push(Box::new(Trimmed(0.8))); }
         if extras & 4 != 0 { registration.degeneracy = DegeneracyPolicy::HoldAtGuess; }

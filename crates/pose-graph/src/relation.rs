@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use projective_registration::{ByField, Field, FieldMatrix};
 use rigid_pose::{Uncertain, inverse_jacobian, product_jacobians};
-use rigid_pose::{pose_difference, step_pose, symmetrised};
+use rigid_pose::{step_pose, symmetrised};
 
 /// A pose `a_from_b` for the field that is assumed for the sensor's shared error: with the covariance of what is random
 /// beside it, and its derivative by the coefficients of the field.
@@ -50,12 +50,9 @@ impl Relation {
 
     /// The mean of two observations of one pose with independent random errors; `None` where a covariance is none.
     pub(crate) fn mean(&self, other: &Self) -> Option<Self> {
-        let information = |one: &Self| Some(one.random.covariance.cholesky()?.inverse());
-        let (own, others) = (information(self)?, information(other)?);
-        let covariance = symmetrised(&(own + others).cholesky()?.inverse());
-        let step = covariance * (others * pose_difference(self.pose(), other.pose()));
-        let random = Uncertain { pose: step_pose(self.pose(), &step), covariance };
-        Some(Self { random, by_field: covariance * (own * self.by_field + others * other.by_field) })
+        let random = self.random.combined(&other.random)?;
+        let weighted = |one: &Self| Some(random.covariance * one.random.covariance.cholesky()?.solve(&one.by_field));
+        Some(Self { random, by_field: weighted(self)? + weighted(other)? })
     }
 
     /// With the covariance of all errors; `field`: that of the coefficients.

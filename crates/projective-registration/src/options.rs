@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::shared_error::SharedError;
-use rigid_pose::{require_count, require_option, require_positive};
+use rigid_pose::{require_count, require_positive};
 
 /// Options of [`align_frames`](crate::align_frames). The defaults carry no scale: lengths come from the frames.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,53 +14,34 @@ pub struct FrameAlignmentOptions {
     /// A motion counts as undetermined when the predicted standard deviation of points at the frame's radius exceeds
     /// this, metre. `None`, the default: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
-    /// Levels that are passed, coarse to fine, 1 to 4. Default 4.
-    pub levels: usize,
-    /// Starts turned by 15 degrees about axes of the source, tried in turn where the frames contradict each other
-    /// after the first level from the guess, at most 14. Where the pose can be doubted at the end, a search around the guess
-    /// follows, within about 0.25 of the radius and 30 degrees; motions that planes leave open are put where outlines
-    /// contradict each other least, and a pose that still contradicts the frames is
-    /// [`Contradicted`](icp_registration::StopReason::Contradicted). 0: none of these. Default 14.
-    pub other_starts: usize,
-    /// Iterations in all levels together, from the start that is best. Default 60.
+    /// Whether a search around the guess follows where the pose can be doubted at the end, within about 0.25 of the radius and 30
+    /// degrees. Motions that planes leave open are then put where outlines contradict each other least, and a pose that still
+    /// contradicts the frames is [`Contradicted`](icp_registration::StopReason::Contradicted). Default: yes.
+    pub search: bool,
+    /// Iterations in all levels together. Default 60.
     pub max_iterations: usize,
-    /// The run has converged when a step moves points at the frame's radius by less than this, metre. `None`, the
-    /// default: 1e-5 of that radius.
-    pub step_tolerance_m: Option<f64>,
     /// The run has settled as soon as a step is shorter than this multiple of its standard deviation, as the weights of
     /// the pairs tell it; most steps are then taken on a quarter of the nodes, and the last one is taken with the
-    /// covariance. `None`: only `step_tolerance_m` counts. Default `None`.
+    /// covariance. `None`, the default: when a step moves points at the radius of the frame by less than 1e-5 of it.
     pub noise_fraction: Option<f64>,
 }
 
 impl FrameAlignmentOptions {
-    /// Share of the radius beyond whose standard deviation a motion is undetermined.
-    pub const OPEN: f64 = icp_registration::quality::OPEN;
-    /// The same where many registrations are put together: poses that
+    /// Share of the radius beyond whose standard deviation a motion is undetermined where many registrations are put together: poses that
     /// are centimetres weak for a moment have little weight there, and are worth more than none.
     pub const OPEN_IN_A_GRAPH: f64 = 1.0 / 50.0;
 }
 
 impl Default for FrameAlignmentOptions {
     fn default() -> Self {
-        Self {
-            shared_error: None,
-            max_motion_sigma_m: None,
-            levels: 4,
-            other_starts: 14,
-            max_iterations: 60,
-            step_tolerance_m: None,
-            noise_fraction: None,
-        }
+        Self { shared_error: None, max_motion_sigma_m: None, search: true, max_iterations: 60, noise_fraction: None }
     }
 }
 
 impl FrameAlignmentOptions {
     pub(crate) fn validate(&self) -> Result<()> {
         require_positive("max_motion_sigma_m", self.max_motion_sigma_m)?;
-        require_positive("step_tolerance_m", self.step_tolerance_m)?;
         require_positive("noise_fraction", self.noise_fraction)?;
-        require_option("levels", self.levels as f64, "1 to 4", |levels| (1.0..=4.0).contains(&levels))?;
         Ok(require_count("max_iterations", self.max_iterations, 1)?)
     }
 }

@@ -4,7 +4,7 @@
 //! six are lengths, so that one eigenvalue compares with another. Whatever pairs a registration has (points, voxels, pixels
 //! that fall on planes), its sums over them become one [`MotionEquations`], and there is one step.
 
-use std::ops::AddAssign;
+use std::iter::Sum;
 
 use nalgebra::{Cholesky, Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -31,8 +31,8 @@ impl Centred {
     /// About the mean of places (metre, most often those of pairs), with their rms distance from it, but at least `least_m`, as
     /// radius.
     #[must_use]
-    pub fn about(places: impl ExactSizeIterator<Item = Vector3<f64>> + Clone, least_m: f64) -> Self {
-        let count = places.len().max(1) as f64;
+    pub fn about(places: impl Iterator<Item = Vector3<f64>> + Clone, least_m: f64) -> Self {
+        let count = places.clone().count().max(1) as f64;
         let centre = places.clone().fold(Vector3::zeros(), |sum, place| sum + place) / count;
         let square: f64 = places.map(|place| (place - centre).norm_squared()).sum();
         Self { centre, radius_m: (square / count).sqrt().max(least_m) }
@@ -129,10 +129,12 @@ impl MotionEquations {
     }
 }
 
-impl AddAssign for MotionEquations {
-    fn add_assign(&mut self, other: Self) {
-        self.matrix += other.matrix;
-        self.gradient += other.gradient;
+impl Sum for MotionEquations {
+    fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
+        parts.fold(Self::default(), |sum, part| Self {
+            matrix: sum.matrix + part.matrix,
+            gradient: sum.gradient + part.gradient,
+        })
     }
 }
 

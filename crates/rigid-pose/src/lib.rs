@@ -6,6 +6,7 @@ mod error;
 mod motions;
 mod requirements;
 mod rotation;
+mod single;
 mod tangent;
 mod uncertain;
 
@@ -21,5 +22,6 @@ pub use requirements::{
     is_finite, is_usable, require_count, require_length, require_option, require_points, require_pose, require_positive,
 };
 pub use rotation::{inverse_left_jacobian, left_jacobian};
+pub use single::SinglePose;
 pub use tangent::{inverse_covariance_transport, pose_difference, step_pose, symmetrised};
 pub use uncertain::{Uncertain, inverse_jacobian, product_jacobians, relative_jacobians};

@@ -3,8 +3,7 @@
 //! `cargo run --release -p tracking --example track_sequence -- [option=value ..]`
 //!
 //! Options: `folder` (of the real sequence), `simulated=off`, `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`,
-//! `loop_attempts`, `window=20` (squared errors over variances of paths of so many frames instead), `levels`,
-//! `fusion=off`, `step_tolerance_m`, `noise_fraction`, `max_iterations`, `max_motion_sigma_m`, `every=1` (a line a frame);
+//! `loop_attempts`, `window=20` (squared errors over variances of paths of so many frames instead), `noise_fraction`, `max_iterations`, `max_motion_sigma_m`, `every=1` (a line a frame);
 //! `sensors=20` (paths of so many simulated sensors whose ranges err alike in all frames, instead);
 //! of the real sequence `first` (frame), `count`, `backwards=1` and `hertz` (30); `invalid=scattered` or `clumps`: a fifth of all pixels
 //! is lost.
@@ -35,7 +34,7 @@ use cpu_clock::cpu_seconds;
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
 use projective_registration::Projection;
 use sequence::{absolute_error, around, frame_at, normalised_error, poses, projection, relative_error};
-use tracking::{Fusion, TrackedPose, Tracker, TrackerOptions, TrackingState};
+use tracking::{TrackedPose, Tracker, TrackerOptions, TrackingState};
 
 /// Value of an option `name=value` of the command line.
 fn argument<T: FromStr>(name: &str) -> Option<T> {
@@ -47,14 +46,9 @@ fn options() -> TrackerOptions {
     options.keyframe_overlap = argument("keyframe_overlap").unwrap_or(options.keyframe_overlap);
     options.max_keyframes = argument("max_keyframes").unwrap_or(options.max_keyframes);
     options.loop_attempts = argument("loop_attempts").unwrap_or(options.loop_attempts);
-    options.alignment.levels = argument("levels").unwrap_or(options.alignment.levels);
     options.alignment.max_motion_sigma_m = argument("max_motion_sigma_m").or(options.alignment.max_motion_sigma_m);
-    options.alignment.step_tolerance_m = argument("step_tolerance_m").or(options.alignment.step_tolerance_m);
     options.alignment.max_iterations = argument("max_iterations").unwrap_or(options.alignment.max_iterations);
     options.alignment.noise_fraction = argument("noise_fraction").or(options.alignment.noise_fraction);
-    if argument::<String>("fusion").is_some_and(|fusion| fusion == "off") {
-        options.fusion = Fusion::Off;
-    }
     options
 }
 

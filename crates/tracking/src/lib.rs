@@ -18,7 +18,7 @@ pub use map::options::MapOptions;
 pub use map::surfaces::SurfaceMap;
 pub use motion_model::motion::MotionPrior;
 pub use nalgebra;
-pub use options::{Fusion, Relocalisation, TrackerOptions};
+pub use options::{Relocalisation, TrackerOptions};
 pub use point_cloud;
 pub use projective_registration;
 pub use rigid_pose;

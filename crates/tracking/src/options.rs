@@ -6,17 +6,6 @@ use rigid_pose::{require_count, require_option, require_pose};
 use crate::error::Result;
 use projective_registration::FrameAlignmentOptions;
 
-/// Whether keyframes learn from the frames tracked against them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Fusion {
-    /// The planes of the keyframe move to the weighted mean (1/sigma²) of all frames that saw them.
-    #[default]
-    Planes,
-    /// A keyframe stays the one frame it was made of.
-    Off,
-}
-
 /// How the pose is sought after a loss.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -40,7 +29,7 @@ const NOISE_FRACTION: f64 = 4.0;
 /// Options of a [`Tracker`](crate::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
-    /// Registration of a frame with a keyframe. Turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
+    /// Registration of a frame with a keyframe. There is no search around the guess; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
     /// the first frame. Default: that of [`FrameAlignmentOptions`] with the share of noise of a stream.
     pub alignment: FrameAlignmentOptions,
     /// Pose of the first frame: the datum, without error. Default: the identity.
@@ -53,8 +42,6 @@ pub struct TrackerOptions {
     /// Older keyframes that each new one is registered with, those that should see most of the same first: what agrees with
     /// the path within its covariance closes a loop. 0: none, which saves that many registrations a keyframe. Default 4.
     pub loop_attempts: usize,
-    /// Whether keyframes learn from frames. Default: [`Fusion::Planes`].
-    pub fusion: Fusion,
     /// How the pose is sought after a loss. Default: [`Relocalisation::Coarse`].
     pub relocalisation: Relocalisation,
 }
@@ -70,7 +57,6 @@ impl Default for TrackerOptions {
             keyframe_overlap: 0.7,
             max_keyframes: 64,
             loop_attempts: 4,
-            fusion: Fusion::Planes,
             relocalisation: Relocalisation::Coarse,
         }
     }

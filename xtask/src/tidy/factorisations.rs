@@ -74,7 +74,7 @@ const KNOWN: &[(Use, &[&str])] = &[
         Use::SmallStep,
         &[
             "fusion/src/surfels/curvature.rs",
-            "icp-registration/src/quality/verdict.rs",
+            "icp-registration/src/quality/directions.rs",
             "inertial/src/state.rs",
             "measurement/src/fit/adjusted.rs",
             "multipath/src/pixels/refine.rs",

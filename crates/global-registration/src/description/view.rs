@@ -79,23 +79,29 @@ impl View {
         }
     }
 
-    /// Face by the largest coordinate, cell by the other two.
     #[inline]
     fn cell(&self, point: [f32; 3]) -> Option<(usize, f32)> {
         let d = subtract(point, self.eye);
-        let a = d.map(f32::abs);
-        let axis = if a[0] >= a[1] && a[0] >= a[2] { 0 } else { 1 + usize::from(a[2] > a[1]) };
-        let largest = a[axis];
-        // NaN fails the comparison.
-        if !(largest > 0.0 && largest.is_finite()) {
-            return None;
-        }
-        let face = 2 * axis + usize::from(d[axis] < 0.0);
-        let scale = 0.5 * self.edge as f32 / largest;
-        let place = |c: f32| ((c + largest) * scale) as usize;
-        let (u, v) = (place(d[(axis + 1) % 3]).min(self.edge - 1), place(d[(axis + 2) % 3]).min(self.edge - 1));
-        Some(((face * self.edge + v) * self.edge + u, length(d)))
+        let [face, cell] = on_cube(d, self.edge)?;
+        Some((face * self.edge * self.edge + cell, length(d)))
     }
+}
+
+/// Where a direction meets a cube about the viewpoint: the face by the largest coordinate, and its cell by the other two, of `edge` along each
+/// edge.
+#[inline]
+pub(crate) fn on_cube(d: [f32; 3], edge: usize) -> Option<[usize; 2]> {
+    let a = d.map(f32::abs);
+    let axis = if a[0] >= a[1] && a[0] >= a[2] { 0 } else { 1 + usize::from(a[2] > a[1]) };
+    let largest = a[axis];
+    // NaN fails the comparison.
+    if !(largest > 0.0 && largest.is_finite()) {
+        return None;
+    }
+    let scale = 0.5 * edge as f32 / largest;
+    let place = |c: f32| (((c + largest) * scale) as usize).min(edge - 1);
+    let (u, v) = (place(d[(axis + 1) % 3]), place(d[(axis + 2) % 3]));
+    Some([2 * axis + usize::from(d[axis] < 0.0), v * edge + u])
 }
 
 /// The least of each cell of a face and those about it, for beside a jump of the range nothing is certain; zero where it is not

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3};
 use crate::description::feature_cloud::Place;
 use crate::description::fpfh::{dot, subtract};
 use point_cloud::SAME_SURFACE_COSINE;
-use rigid_pose::absolute_orientation;
+use rigid_pose::{SinglePose, absolute_orientation};
 
 /// Largest difference of the cosines between normals, and of normals with the line between the points, at which two
 /// correspondences agree.
@@ -54,13 +54,13 @@ impl Correspondences {
 
     /// Correspondences that agree with a pose in position, to `tolerance` metre, and normal.
     pub(crate) fn inliers(&self, pose: &Isometry3<f64>, tolerance: f32) -> Vec<u32> {
-        let motion = Motion::new(pose);
+        let motion = SinglePose::new(pose);
         let limit = tolerance * tolerance;
         (0..self.len())
             .filter(|&i| {
                 let [[p, n], [q, m]] = self.rows[i];
-                let difference = subtract(motion.point(p), q);
-                let turned = dot(motion.vector(n), m);
+                let difference = subtract(motion.moved(p), q);
+                let turned = dot(motion.turned(n), m);
                 dot(difference, difference) <= limit && (turned >= SAME_SURFACE_COSINE as f32 || turned.is_nan())
             })
             .map(|i| i as u32)
@@ -87,30 +87,4 @@ pub(crate) fn agree(first: &[Place; 2], second: &[Place; 2], tolerance: f32) -> 
 
 fn point(p: [f32; 3]) -> Point3<f64> {
     Point3::from(p.map(f64::from))
-}
-
-/// A pose in single precision, for loops over many points about the origin.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Motion {
-    rows: [[f32; 3]; 3],
-    shift: [f32; 3],
-}
-
-impl Motion {
-    pub(crate) fn new(pose: &Isometry3<f64>) -> Self {
-        let matrix = pose.rotation.to_rotation_matrix();
-        let rows = std::array::from_fn(|r| std::array::from_fn(|c| matrix[(r, c)] as f32));
-        Self { rows, shift: std::array::from_fn(|k| pose.translation.vector[k] as f32) }
-    }
-
-    #[inline(always)]
-    pub(crate) fn vector(&self, v: [f32; 3]) -> [f32; 3] {
-        [dot(self.rows[0], v), dot(self.rows[1], v), dot(self.rows[2], v)]
-    }
-
-    #[inline(always)]
-    pub(crate) fn point(&self, p: [f32; 3]) -> [f32; 3] {
-        let [x, y, z] = self.vector(p);
-        [x + self.shift[0], y + self.shift[1], z + self.shift[2]]
-    }
 }

@@ -5,11 +5,10 @@
 //! front of furniture its room was. Points with many others behind their tangent plane, in both clouds, tell places apart.
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
-use rigid_pose::{Centred, symmetrised};
+use rigid_pose::{Centred, SinglePose, symmetrised};
 
 use crate::description::feature_cloud::FeatureCloud;
 use crate::description::fpfh::{dot, subtract};
-use crate::hypotheses::correspondences::Motion;
 use crate::options::CoarseOptions;
 use crate::verification::judge::{Verdict, partner, unevenness};
 use crate::verification::shared_error::{Errors, Misses, Residual, errors};
@@ -25,11 +24,9 @@ const SAME_OFFSET_VOXELS: f32 = 0.6;
 const SAME_SLOPE: f32 = 0.03;
 /// Planes that are looked for.
 const MOST_PLANES: usize = 12;
-/// Steps of a voxel to either side that are tried where planes leave a motion open, the share of the evidence that may be
-/// missing where edges put the pose, and the smallest eigenvalue a point below which a motion is open: planes whose normals
-/// differ by less than 4.4 degrees tell no motion, as noise bends them by that.
+/// Steps of a voxel to either side that are tried where planes leave a motion open, and the smallest eigenvalue a point below which a motion
+/// is open: planes whose normals differ by less than 4.4 degrees tell no motion, as noise bends them by that.
 const SLIDES: i32 = 6;
-const HARDLY: f64 = 0.25;
 const OPEN: f64 = 6e-3;
 /// Least part of a normal along a motion at which the surface faces it.
 const FACING: f64 = 0.4;
@@ -108,21 +105,14 @@ impl Common {
         (mean, square / sum - mean * mean + 1.0 / 12.0)
     }
 
-    /// The pose with its verdict and covariance. What planes leave open is put where edges hold it, unless too much speaks
-    /// against that.
+    /// The pose with its verdict and covariance. What planes leave open is put where edges hold it.
     pub(crate) fn settled(&self, source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>) -> Settled {
         let voxel_m = target.voxel_m();
-        let (mut pose, mut verdict) = (*pose, Verdict::new(source, target, pose, 1));
+        let mut pose = *pose;
         let mut of_motion = self.errors.map_or_else(Matrix6::zeros, |errors| errors.covariance);
         for motion in self.planes.open() {
-            let (mean, mut square) = self.held_by_edges(source, target, &pose, &motion);
-            let moved = self.planes.frame.moved(&pose, &(motion * (mean * voxel_m)));
-            let there = Verdict::new(source, target, &moved, 1);
-            if there.evidence() > (1.0 - HARDLY) * verdict.evidence() {
-                (pose, verdict) = (moved, there);
-            } else {
-                square += mean * mean;
-            }
+            let (mean, square) = self.held_by_edges(source, target, &pose, &motion);
+            pose = self.planes.frame.moved(&pose, &(motion * (mean * voxel_m)));
             of_motion += motion * motion.transpose() * (square * voxel_m * voxel_m);
         }
         let largest =
@@ -130,18 +120,19 @@ impl Common {
         let sigma_m = largest.ok().filter(|_| self.errors.is_some()).map_or(f64::INFINITY, f64::sqrt);
         let frame = Centred { centre: self.planes.frame.centre + target.reduced.middle, ..self.planes.frame };
         let to_tangent = frame.tangent_from_motion(&target.between_frames(source, &pose));
+        let verdict = Verdict::new(source, target, &pose, 1);
         Settled { pose, verdict, covariance: symmetrised(&(to_tangent * of_motion * to_tangent.transpose())), sigma_m }
     }
 }
 
 /// Sampled points of one cloud and their partners in the other.
 fn pairs(from: &FeatureCloud, to: &FeatureCloud, pose: &Isometry3<f64>) -> Vec<[usize; 2]> {
-    let motion = Motion::new(pose);
+    let motion = SinglePose::new(pose);
     let sided = from.normals.sided && to.normals.sided;
     let voxel = to.reduced.voxel_m as f32;
     let of = |&i: &u32| {
         let i = i as usize;
-        let (point, normal) = (motion.point(from.reduced.points[i]), motion.vector(from.normals.vectors[i]));
+        let (point, normal) = (motion.moved(from.reduced.points[i]), motion.turned(from.normals.vectors[i]));
         partner(to, point, normal, sided, voxel).map(|near| [i, near])
     };
     from.sample.iter().filter_map(of).collect()
@@ -174,7 +165,7 @@ impl Planes {
         let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
         let place = |i: usize| wide(cloud.reduced.points[i]);
         let frame = Centred::about(on.iter().map(|&[_, i]| place(i)), cloud.voxel_m());
-        let motion = Motion::new(pose);
+        let motion = SinglePose::new(pose);
         let mut residuals = Vec::new();
         for _ in 0..MOST_PLANES {
             let size = |seed: usize| on.iter().filter(|&&[_, i]| is_on_plane(cloud, seed, i)).count();
@@ -192,7 +183,7 @@ impl Planes {
                 Residual {
                     place: place(i),
                     derivative: frame.derivative(&place(i), &normal),
-                    distance: wide(subtract(motion.point(source.reduced.points[of_source]), cloud.reduced.points[i]))
+                    distance: wide(subtract(motion.moved(source.reduced.points[of_source]), cloud.reduced.points[i]))
                         .dot(&wide(cloud.normals.vectors[i])),
                 }
             }));

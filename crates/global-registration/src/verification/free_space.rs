@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::description::view::least_around;
+use crate::description::view::{least_around, on_cube};
 
 /// The ranges up to which a station surely saw nothing, by direction: on the six faces of a cube about its viewpoint.
 #[derive(Debug, Clone)]
@@ -37,7 +37,7 @@ impl FreeSpace {
     fn fill(&mut self, seen: &[(Point3<f64>, f64)]) {
         self.faces = Default::default();
         for (point, free_to_m) in seen.iter().filter(|(_, free_to_m)| *free_to_m > 0.0) {
-            let Some((face, cell)) = self.cell(point) else { continue };
+            let Some([face, cell]) = on_cube(point.coords.cast().into(), self.edge) else { continue };
             let cells = &mut self.faces[face];
             cells.resize(self.edge * self.edge, f32::INFINITY);
             cells[cell] = cells[cell].min(*free_to_m as f32);
@@ -46,21 +46,7 @@ impl FreeSpace {
 
     /// Whether the station looked through this place.
     pub fn holds(&self, place: &Point3<f64>) -> bool {
-        let Some((face, cell)) = self.cell(place) else { return false };
+        let Some([face, cell]) = on_cube(place.coords.cast().into(), self.edge) else { return false };
         self.faces[face].get(cell).is_some_and(|free_to_m| place.coords.norm() < f64::from(*free_to_m))
-    }
-
-    /// Face by the largest coordinate, cell by the other two.
-    fn cell(&self, point: &Point3<f64>) -> Option<(usize, usize)> {
-        let axis = point.coords.iamax();
-        let largest = point[axis].abs();
-        // NaN fails the comparison.
-        if !(largest > 0.0 && largest.is_finite()) {
-            return None;
-        }
-        let scale = 0.5 * self.edge as f64 / largest;
-        let place = |c: f64| (((c + largest) * scale) as usize).min(self.edge - 1);
-        let (u, v) = (place(point[(axis + 1) % 3]), place(point[(axis + 2) % 3]));
-        Some((2 * axis + usize::from(point[axis] < 0.0), v * self.edge + u))
     }
 }

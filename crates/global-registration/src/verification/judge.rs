@@ -5,8 +5,8 @@ use nalgebra::Isometry3;
 use crate::description::feature_cloud::FeatureCloud;
 use crate::description::fpfh::{dot, subtract};
 use crate::description::view::{Jumps, Sight};
-use crate::hypotheses::correspondences::Motion;
 use crate::verification::shared_error::Misses;
+use rigid_pose::SinglePose;
 
 /// Least cosine between the normals of partners: with 0.7, as elsewhere, one more of 126 real pairs is answered wrongly.
 const LEAST_COSINE: f32 = 0.8;
@@ -72,8 +72,8 @@ impl Verdict {
         pose: &Isometry3<f64>,
         faces: impl Fn([f32; 3], [f32; 3]) -> bool,
     ) -> f64 {
-        let (forward, back) = (Motion::new(pose), pose.inverse());
-        let own = count(source, target, pose, 1, Jumps::Missed, |p, n| faces(forward.point(p), forward.vector(n)));
+        let (forward, back) = (SinglePose::new(pose), pose.inverse());
+        let own = count(source, target, pose, 1, Jumps::Missed, |p, n| faces(forward.moved(p), forward.turned(n)));
         let both = own.and(&count(target, source, &back, 1, Jumps::Missed, &faces));
         both.contradicting() - both.hits as f64
     }
@@ -121,14 +121,14 @@ fn count(
     jumps: Jumps,
     counts: impl Fn([f32; 3], [f32; 3]) -> bool,
 ) -> Verdict {
-    let motion = Motion::new(pose);
+    let motion = SinglePose::new(pose);
     let sided = from.normals.sided && to.normals.sided;
     let voxel = to.reduced.voxel_m as f32;
     let mut count = Verdict::default();
     for &i in from.sample.iter().step_by(stride) {
         count.points += 1;
         let (own, own_normal) = (from.reduced.points[i as usize], from.normals.vectors[i as usize]);
-        let (point, normal) = (motion.point(own), motion.vector(own_normal));
+        let (point, normal) = (motion.moved(own), motion.turned(own_normal));
         if partner(to, point, normal, sided, voxel).is_some() {
             count.hits += usize::from(counts(own, own_normal));
             continue;

@@ -2,11 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
 use point_cloud::SAME_SURFACE_COSINE;
-use rigid_pose::{Centred, MotionEquations};
+use rigid_pose::{Centred, MotionEquations, SinglePose};
 
 use crate::description::feature_cloud::FeatureCloud;
 use crate::description::fpfh::{dot, subtract};
-use crate::hypotheses::correspondences::Motion;
 
 /// Steps with partners in cells of two voxels, then of one.
 const STEPS: [usize; 2] = [5, 4];
@@ -100,14 +99,14 @@ impl System {
 }
 
 fn pairs(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>, level: usize) -> Vec<Pair> {
-    let motion = Motion::new(pose);
+    let motion = SinglePose::new(pose);
     let sided = source.normals.sided && target.normals.sided;
     let labels = &target.labels[1 - level];
     let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
     let of = |&i: &u32| {
-        let point = motion.point(source.reduced.points[i as usize]);
+        let point = motion.moved(source.reduced.points[i as usize]);
         let near = labels.near(point)?;
-        let (own, other) = (motion.vector(source.normals.vectors[i as usize]), target.normals.vectors[near]);
+        let (own, other) = (motion.turned(source.normals.vectors[i as usize]), target.normals.vectors[near]);
         let cosine = if sided { dot(own, other) } else { dot(own, other).abs() };
         let residual = dot(subtract(point, target.reduced.points[near]), other);
         (cosine >= SAME_SURFACE_COSINE as f32).then(|| Pair {

@@ -2,14 +2,12 @@
 
 pub(crate) mod engine;
 mod prior;
-mod settled;
 mod starts;
 mod validation;
 
 pub use engine::descent::{Alternative, Levels};
 pub use engine::options::{IcpOptions, Metric};
 pub use engine::registration::Registration;
-pub use settled::Settled;
 pub use starts::Starts;
 
 use nalgebra::Isometry3;

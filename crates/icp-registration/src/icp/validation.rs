@@ -11,7 +11,7 @@ impl Registration<'_> {
     pub(super) fn validate(&self, scene: &Scene<'_>) -> Result<()> {
         self.metric.validate(scene)?;
         self.minimisation.validate(&*self.metric)?;
-        self.stopping.validate()?;
+        require_count("max_iterations", self.max_iterations, 1)?;
         self.levels.validate()?;
         self.starts.map_or(Ok(()), |starts| starts.validate())?;
         for alternative in &self.alternatives {

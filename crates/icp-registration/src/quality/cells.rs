@@ -6,8 +6,6 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 
 use rigid_pose::Centred;
 
-use super::directions::FEWEST_CELLS;
-
 /// Degrees of freedom that the mean of Hotelling's T² of six unknowns falls short of.
 const LOST_DEGREES: f64 = 7.0;
 
@@ -22,9 +20,6 @@ pub(crate) struct Cells {
     pub(super) frame: Centred,
     cell_m: f64,
     sums: BTreeMap<[i64; 3], Cell>,
-    pairs: usize,
-    /// Sum of the squares of the scores of single pairs.
-    squares: Matrix6<f64>,
 }
 
 impl Cells {
@@ -33,7 +28,7 @@ impl Cells {
 
     /// No pairs yet; those in a cube of `cell_m` will count as one observation.
     pub fn new(frame: Centred, cell_m: f64) -> Self {
-        Self { frame, cell_m, sums: BTreeMap::new(), pairs: 0, squares: Matrix6::zeros() }
+        Self { frame, cell_m, sums: BTreeMap::new() }
     }
 
     /// Adds a pair at `place` (target frame) with its score, weight times derivative times residual. Returned is what its
@@ -44,8 +39,6 @@ impl Cells {
         let cell: [f64; 3] = ((place - self.frame.centre) / self.cell_m).into();
         let cell = self.sums.entry(cell.map(|v| v.floor() as i64)).or_default();
         cell.score += score;
-        self.squares.ger(1.0, score, score, 1.0);
-        self.pairs += 1;
         &mut cell.information
     }
 
@@ -58,12 +51,6 @@ impl Cells {
         self.sums.values().map(|c| motion.dot(&(c.information * motion)).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Covariance of the summed score of pairs that share nothing.
-    pub(super) fn independent_scores(&self) -> Matrix6<f64> {
-        let pairs = self.pairs as f64;
-        self.squares * (pairs / (pairs - 6.0).max(1.0))
-    }
-
     /// Covariance of the summed score from the scatter of its sums over cells (`inverse`: of the information), and the
     /// factor by which it is to be enlarged.
     ///
@@ -72,10 +59,6 @@ impl Cells {
     /// scatter of so few is at times much too small. Enlarged by their degrees of freedom, the normalised square of an
     /// error has the expectation that a known covariance would give it (Hotelling's T²).
     pub(super) fn clustered_scores(&self, inverse: &Matrix6<f64>) -> (Matrix6<f64>, f64) {
-        if self.sums.len() < FEWEST_CELLS {
-            // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            return (self.independent_scores() * (self.pairs as f64 / self.sums.len().max(1) as f64), 1.0);
-        }
         let (mut trace, mut squares) = (0.0, 0.0);
         let sum = self.sums.values().fold(Matrix6::zeros(), |sum, cell| {
             let leverage = cell.information * inverse;

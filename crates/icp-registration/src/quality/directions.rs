@@ -1,6 +1,6 @@
 //! Which motions the information of pairs determines.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use crate::error::Result;
 use crate::quality::UndeterminedMotion;
@@ -11,12 +11,13 @@ use rigid_pose::{Centred, eigen6, free_of, symmetrised};
 pub const SIGNIFICANCE: f64 = 2.5;
 /// Share of the radius beyond whose standard deviation a motion is undetermined, where nothing else is said.
 pub const OPEN: f64 = 1.0 / 300.0;
-/// Cells below which their scatter is no estimate.
-pub const FEWEST_CELLS: usize = 20;
+/// Response over information outside which the differences are noise (matching can only weaken the response, to about
+/// a half).
+const RESPONSE: std::ops::Range<f64> = 0.25..2.0;
 
 /// One eigen-direction of the information.
 #[derive(Debug, Clone, Copy)]
-pub struct Direction {
+pub(crate) struct Direction {
     /// Unit motion `[dt, rho w]`.
     pub vector: Vector6<f64>,
     /// Eigenvalue of the information along it, 1/metre².
@@ -71,7 +72,7 @@ impl Directions {
     }
 
     /// All six, worst first.
-    pub fn all(&self) -> &[Direction] {
+    pub(crate) fn all(&self) -> &[Direction] {
         &self.all
     }
 
@@ -87,25 +88,23 @@ impl Directions {
         name_motions(&space, frame)
     }
 
-    /// Columns of the known motions, and the covariance along them: the sandwich `A⁻¹ M A⁻ᵀ` of the covariance of the
-    /// score and the response A among them (`response`; their information where that has nothing to say).
-    pub fn sandwich(
-        &self,
-        known: &[&Direction],
-        response: impl Fn(&DMatrix<f64>) -> Option<DMatrix<f64>>,
-    ) -> (DMatrix<f64>, DMatrix<f64>) {
-        let basis = DMatrix::from_fn(6, known.len(), |r, c| known[c].vector[r]);
-        let inverse = response(&basis).unwrap_or_else(|| {
-            DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|d| 1.0 / d.information)))
+    /// Covariance of motions `[dt, rho w]`: the sandwich `A⁻¹ M A⁻ᵀ` of the covariance of the score and the response A of the score to
+    /// the pose (`response`; the information where that has nothing to say). What is not known at all gets the radius as sigma.
+    pub fn covariance(&self, radius_m: f64, response: Option<&Matrix6<f64>>) -> Matrix6<f64> {
+        let (known, unknown): (Vec<&Direction>, Vec<&Direction>) = self.all.iter().partition(|d| d.sigma_m.is_finite());
+        let inverse = response.and_then(|response| inverse_response(&known, response)).unwrap_or_else(|| {
+            known.iter().fold(Matrix6::zeros(), |sum, d| sum + d.vector * d.vector.transpose() / d.information)
         });
-        let score = basis.transpose() * self.score * &basis;
-        let inside = &inverse * score * inverse.transpose();
-        (basis, inside)
+        let own = inverse * self.score * inverse.transpose();
+        unknown.iter().fold(own, |sum, d| sum + d.vector * d.vector.transpose() * radius_m.powi(2))
     }
 }
 
-/// A matrix along the columns of `basis` as one of all six motions.
-pub fn expanded(basis: &DMatrix<f64>, inside: &DMatrix<f64>) -> Matrix6<f64> {
-    let full = basis * inside * basis.transpose();
-    Matrix6::from_fn(|r, c| full[(r, c)])
+/// Inverse of the response among the known directions; none where the differences drown in noise.
+fn inverse_response(known: &[&Direction], response: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    let basis = DMatrix::from_fn(6, known.len(), |r, c| known[c].vector[r]);
+    let reduced = basis.transpose() * response * &basis;
+    let plausible = known.iter().enumerate().all(|(k, d)| RESPONSE.contains(&(reduced[(k, k)] / d.information)));
+    let inverse = &basis * reduced.try_inverse().filter(|_| plausible)? * basis.transpose();
+    Some(Matrix6::from_fn(|r, c| inverse[(r, c)]))
 }

@@ -13,6 +13,11 @@ mod motion;
 mod verdict;
 
 pub(crate) use cells::Cells;
-pub use directions::{Direction, Directions, FEWEST_CELLS, OPEN, SIGNIFICANCE, expanded};
+pub use directions::{Directions, OPEN, SIGNIFICANCE};
 pub use motion::{MotionKind, UndeterminedMotion};
 pub(crate) use verdict::{Free, ROUNDING, Verdict};
+
+/// Fewest pairs that a pose is told by: three an unknown and two more. Clouds and frames that overlap have hundreds.
+pub const FEWEST_PAIRS: usize = 20;
+/// Length of a step, in units of the radius, at which a pose stands: far below every noise.
+pub const SMALL_STEP: f64 = 1e-5;

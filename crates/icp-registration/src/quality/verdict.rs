@@ -1,18 +1,15 @@
 //! Covariance and verdict from the sums over cells.
 
-use nalgebra::{DMatrix, Isometry3, Matrix6, Point3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 use super::cells::Cells;
-use super::directions::{Direction, Directions, SIGNIFICANCE, expanded};
+use super::directions::{Directions, SIGNIFICANCE};
 use crate::error::Result;
 use crate::quality::UndeterminedMotion;
 use rigid_pose::{Centred, symmetrised};
 
 /// Share of the largest information that rounding can imitate.
 pub(crate) const ROUNDING: f64 = 1e-9;
-/// Response over information outside which the differences are noise (matching can only weaken the response, to about
-/// a half).
-const RESPONSE: std::ops::Range<f64> = 0.25..2.0;
 
 /// The motions that steps may take.
 #[derive(Debug, Clone, Copy)]
@@ -72,21 +69,8 @@ impl Verdict {
     /// Covariance in the tangent `[dt target axes, dtheta source axes]`: the sandwich `A⁻¹ M A⁻ᵀ` with the response A of
     /// the score. What is not known at all gets the radius of the pairs as sigma.
     pub fn covariance(&self, pose: &Isometry3<f64>, response: Option<&Matrix6<f64>>) -> Matrix6<f64> {
-        let (known, unknown): (Vec<&Direction>, Vec<&Direction>) =
-            self.directions.all().iter().partition(|d| d.sigma_m.is_finite());
-        let (basis, inside) = self.directions.sandwich(&known, |basis| inverse_response(&known, basis, response?));
-        let mut centred = expanded(&basis, &inside);
-        for direction in unknown {
-            centred += direction.vector * direction.vector.transpose() * self.frame.radius_m.powi(2);
-        }
+        let centred = self.directions.covariance(self.frame.radius_m, response);
         let to_tangent = self.frame.tangent_from_motion(pose);
         symmetrised(&(to_tangent * centred * to_tangent.transpose()))
     }
-}
-
-/// Inverse of the response among the known directions; none where the differences drown in noise.
-fn inverse_response(known: &[&Direction], basis: &DMatrix<f64>, response: &Matrix6<f64>) -> Option<DMatrix<f64>> {
-    let reduced = basis.transpose() * response * basis;
-    let plausible = known.iter().enumerate().all(|(k, d)| RESPONSE.contains(&(reduced[(k, k)] / d.information)));
-    if plausible { reduced.try_inverse() } else { None }
 }

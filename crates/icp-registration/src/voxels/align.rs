@@ -9,7 +9,7 @@ use super::pairs::{Matcher, Pair, Partners, System, matched};
 use super::wide::{RULES, Wide};
 use crate::error::Result;
 use crate::kernel::RobustKernel;
-use crate::quality::{Cells, Free, OPEN, Verdict};
+use crate::quality::{Cells, FEWEST_PAIRS, Free, OPEN, SMALL_STEP, Verdict};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
 use rigid_pose::{InputError, motion_length, require_pose};
 
@@ -139,7 +139,7 @@ impl<'a> Run<'a> {
 
     /// Iterates on the finest level.
     fn settle(&mut self, matcher: Matcher<'_>) -> Result<StopReason> {
-        let tolerance_m = self.options.step_tolerance_m.unwrap_or(1e-5 * self.target.radius_m);
+        let tolerance_m = SMALL_STEP * self.target.radius_m;
         let mut step_m = self.search(matcher, self.options.kernel)?;
         while step_m > tolerance_m {
             if self.iterations >= self.options.max_iterations {
@@ -156,7 +156,7 @@ impl<'a> Run<'a> {
         let mut system = self.enough(matcher, partners, kernel)?;
         system.frame = free.frame.unwrap_or(system.frame);
         let frame = system.frame;
-        let mut step = system.step(&free.projection)?;
+        let mut step = system.normal_equations().step(&free.projection, 0.0)?;
         // Partners give no reason to move farther than they can be apart.
         step /= (motion_length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
         self.pose = frame.moved(&pose, &step);
@@ -165,7 +165,7 @@ impl<'a> Run<'a> {
     }
 
     fn enough(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<System<'_>> {
-        let (pose, iteration, needed) = (self.pose, self.iterations, self.options.min_correspondences);
+        let (pose, iteration, needed) = (self.pose, self.iterations, FEWEST_PAIRS);
         let system = self.system(matcher, &pose, partners, kernel);
         if system.count < needed {
             let (found, of, max_distance_m) = (system.count, matcher.source.voxels.len(), matcher.limit_m());

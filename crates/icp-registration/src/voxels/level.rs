@@ -6,10 +6,9 @@ use rayon::prelude::*;
 use super::numerics::blocks::Blocks;
 use super::numerics::lattice::{Lattice, cell};
 use super::numerics::moments::Moments;
+use crate::system::CHUNK;
 use point_cloud::{SAME_SURFACE_COSINE, eigenvalues3, eigenvector3};
 
-/// Voxels handled together by one thread; fixed, so that sums do not depend on the number of threads.
-pub(crate) const CHUNK: usize = 512;
 /// Fewest points and voxels that a plane is fitted to.
 const FEWEST_POINTS: f64 = 6.0;
 const FEWEST_VOXELS: usize = 3;

@@ -17,16 +17,11 @@ pub struct VoxelAlignmentOptions {
     pub kernel: RobustKernel,
     /// Iterations in all levels together. Default 100.
     pub max_iterations: usize,
-    /// The run has converged when the step moves points at the cloud's radius by less than this, metre. `None`, the
-    /// default: 1e-5 of that radius.
-    pub step_tolerance_m: Option<f64>,
     /// What happens to undetermined motions. Default: [`DegeneracyPolicy::Report`].
     pub degeneracy: DegeneracyPolicy,
     /// A motion counts as undetermined when the predicted standard deviation of points at the cloud's radius exceeds
     /// this, metre. `None`, the default: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
-    /// Fewest pairs of voxels. Default 20.
-    pub min_correspondences: usize,
 }
 
 impl Default for VoxelAlignmentOptions {
@@ -35,10 +30,8 @@ impl Default for VoxelAlignmentOptions {
             max_start_error_m: None,
             kernel: RobustKernel::Welsch,
             max_iterations: 100,
-            step_tolerance_m: None,
             degeneracy: DegeneracyPolicy::Report,
             max_motion_sigma_m: None,
-            min_correspondences: 20,
         }
     }
 }
@@ -46,9 +39,7 @@ impl Default for VoxelAlignmentOptions {
 impl VoxelAlignmentOptions {
     pub(crate) fn validate(&self) -> Result<()> {
         require_positive("max_start_error_m", self.max_start_error_m)?;
-        require_positive("step_tolerance_m", self.step_tolerance_m)?;
         require_positive("max_motion_sigma_m", self.max_motion_sigma_m)?;
-        require_count("max_iterations", self.max_iterations, 1)?;
-        Ok(require_count("min_correspondences", self.min_correspondences, 6)?)
+        Ok(require_count("max_iterations", self.max_iterations, 1)?)
     }
 }

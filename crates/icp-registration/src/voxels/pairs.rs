@@ -1,14 +1,14 @@
 //! Pairs of source and target voxels at a pose.
 
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 use statistics::mad_scale;
 
-use super::level::{CHUNK, Level};
+use super::level::Level;
 use super::numerics::lattice::Lattice;
-use crate::error::Result;
 use crate::kernel::RobustKernel;
 use crate::quality::Cells;
+use crate::system::CHUNK;
 use rigid_pose::{Centred, MotionEquations};
 
 /// Partners farther apart than this many voxels belong to different things.
@@ -117,19 +117,9 @@ pub(crate) struct System<'a> {
 impl<'a> System<'a> {
     pub fn new(pairs: &'a [Pair], kernel: RobustKernel, scratch: &mut Vec<f64>) -> Self {
         scratch.clear();
-        let (mut sum, mut square) = (Vector3::zeros(), 0.0);
-        let start = matched(pairs).next().map_or(Vector3::zeros(), |p| p.moved);
-        for pair in matched(pairs) {
-            let place = pair.moved - start;
-            sum += place;
-            square += place.norm_squared();
-            scratch.push(pair.residual.abs() / pair.variance.sqrt());
-        }
-        let count = scratch.len();
-        let n = count.max(1) as f64;
-        let radius_m = (square / n - (sum / n).norm_squared()).max(0.0).sqrt().max(f64::MIN_POSITIVE.sqrt());
-        let frame = Centred { centre: start + sum / n, radius_m };
-        Self { pairs, frame, count, kernel, scale: mad_scale(scratch).max(0.0) }
+        scratch.extend(matched(pairs).map(|pair| pair.residual.abs() / pair.variance.sqrt()));
+        let frame = Centred::about(matched(pairs).map(|pair| pair.moved), f64::MIN_POSITIVE.sqrt());
+        Self { pairs, frame, count: scratch.len(), kernel, scale: mad_scale(scratch).max(0.0) }
     }
 
     /// Weight of a pair and the slope of its influence, both over its variance.
@@ -145,32 +135,17 @@ impl<'a> System<'a> {
     }
 
     /// Normal equations, summed in fixed chunks.
-    fn normal_equations(&self) -> MotionEquations {
+    pub fn normal_equations(&self) -> MotionEquations {
         let unit = self.frame.radius_m.powi(2);
-        let partial: Vec<[f64; 27]> = self
-            .pairs
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                let mut sums = [0.0; 27];
-                for pair in matched(chunk) {
-                    let weight = self.weights(pair).0 * unit;
-                    add(&mut sums, &self.frame.derivative(&pair.moved, &pair.normal), weight, pair.residual);
-                }
-                sums
-            })
-            .collect();
-        let (mut gradient, mut upper) = ([0.0; 6], [0.0; 21]);
-        for sums in &partial {
-            let (own_gradient, own_upper) = sums.split_at(6);
-            gradient.iter_mut().zip(own_gradient).for_each(|(total, sum)| *total += sum);
-            upper.iter_mut().zip(own_upper).for_each(|(total, sum)| *total += sum);
-        }
-        MotionEquations::from_sums(&upper, &gradient)
-    }
-
-    /// One Gauss-Newton step `[dt, rho w]` among the motions that are free (a projection).
-    pub fn step(&self, free: &Matrix6<f64>) -> Result<Vector6<f64>> {
-        Ok(self.normal_equations().step(free, 0.0)?)
+        let of_chunk = |chunk: &[Pair]| {
+            let mut equations = MotionEquations::default();
+            for pair in matched(chunk) {
+                let derivative = self.frame.derivative(&pair.moved, &pair.normal);
+                equations.add(&derivative, self.weights(pair).0 * unit, pair.residual);
+            }
+            equations
+        };
+        self.pairs.par_chunks(CHUNK).map(of_chunk).collect::<Vec<_>>().into_iter().sum()
     }
 
     /// What the pairs say about the pose, those in a cube of `cell_m` as one observation.
@@ -204,19 +179,6 @@ impl<'a> System<'a> {
     }
 }
 
-#[inline]
-fn add(sums: &mut [f64; 27], j: &Vector6<f64>, weight: f64, residual: f64) {
-    let mut k = 6;
-    for r in 0..6 {
-        let weighted = weight * j[r];
-        sums[r] += weighted * residual;
-        for c in r..6 {
-            sums[k] += weighted * j[c];
-            k += 1;
-        }
-    }
-}
-
-pub(crate) fn matched(pairs: &[Pair]) -> impl Iterator<Item = &Pair> {
+pub(crate) fn matched(pairs: &[Pair]) -> impl Iterator<Item = &Pair> + Clone {
     pairs.iter().filter(|p| p.variance < f64::INFINITY)
 }

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use point_cloud::middle_and_radius;
 
 use super::numerics::gather::gather;
-use super::numerics::lattice::{Bounds, Lattice};
+use super::numerics::lattice::{Bounds, CELLS, Lattice};
 use super::numerics::moments::Moments;
 use crate::error::Result;
 
@@ -22,10 +22,6 @@ const POINTS_A_VOXEL: f64 = 8.0;
 const PROBES: f64 = 10.0;
 /// Points that the cell of a typical point must hold in the sample.
 const POINTS_A_PROBE: f64 = 6.0;
-/// Share of the extent below which indices could overflow.
-const SMALLEST_SHARE: f64 = 1e-6;
-/// Factor by which the size grows until there are few enough voxels.
-const GROWTH: f64 = 1.05;
 
 /// Edge of the voxels, metre: the voxel of a typical point holds about eight, but there are at most about 10 000 voxels.
 pub(crate) fn voxel_size(points: &[Point3<f64>], (low, high): &Bounds) -> Result<f64> {
@@ -35,7 +31,8 @@ pub(crate) fn voxel_size(points: &[Point3<f64>], (low, high): &Bounds) -> Result
         // All points in one place: any size will do.
         return Ok(1.0);
     }
-    let smallest = SMALLEST_SHARE * extent;
+    // Where most points lie in one place, cells are still so large that their indices fit.
+    let smallest = 2.0 * extent / CELLS;
     let mut probe = (radius / PROBES).max(smallest);
     let mut counts = counted(&sample, probe)?;
     while typical(&counts) < POINTS_A_PROBE && probe < extent {
@@ -43,13 +40,9 @@ pub(crate) fn voxel_size(points: &[Point3<f64>], (low, high): &Bounds) -> Result
         counts = counted(&sample, probe)?;
     }
     let thinning = points.len() as f64 / sample.len() as f64;
-    let mut fineness = (typical(&counts) * thinning / POINTS_A_VOXEL).sqrt();
-    // No more voxels than points in a cell.
-    let voxels = |fineness: f64| counts.iter().map(|c| (c * thinning).min(fineness * fineness)).sum::<f64>();
-    while fineness > 1.0 && voxels(fineness) > MOST_VOXELS {
-        fineness /= GROWTH;
-    }
-    Ok((probe / fineness).max(smallest))
+    let by_points = POINTS_A_VOXEL / (typical(&counts) * thinning);
+    let by_voxels = counts.len() as f64 / MOST_VOXELS;
+    Ok((probe * by_points.max(by_voxels).sqrt()).max(smallest))
 }
 
 /// Points in the cell of the typical point.

@@ -11,8 +11,6 @@ use rigid_pose::{Centred, MotionEquations};
 /// Samples of the source and of the target.
 const SOURCE_SAMPLES: usize = 400;
 const TARGET_SAMPLES: usize = 1000;
-/// Levels with fewer planes are no basis for samples.
-const FEWEST_PLANES: usize = 600;
 /// Factor of the scale from one step to the next.
 const FALL: f64 = 0.8;
 
@@ -61,11 +59,9 @@ impl Wide {
     }
 
     fn frame(&self, pose: &Isometry3<f64>) -> Option<Centred> {
-        let n = self.source.len() as f64;
-        let first = self.source.first()?.mean;
-        let mean = first + self.source.iter().fold(Vector3::zeros(), |sum, v| sum + (v.mean - first)) / n;
-        (self.radius_m > 0.0 && !self.target.voxels.is_empty())
-            .then(|| Centred { centre: (pose * mean).coords, radius_m: self.radius_m })
+        let about = Centred::about(self.source.iter().map(|voxel| (pose * voxel.mean).coords), 0.0);
+        (self.radius_m > 0.0 && !self.source.is_empty() && !self.target.voxels.is_empty())
+            .then_some(Centred { radius_m: self.radius_m, ..about })
     }
 
     fn step(&self, pose: &Isometry3<f64>, rule: Rule, scale: f64, frame: Centred) -> Result<Vector6<f64>> {
@@ -91,8 +87,8 @@ impl Wide {
     }
 }
 
-/// Planes evenly from the coarsest level that has enough of them.
+/// Planes evenly from the coarsest level that has so many.
 fn sample(levels: &[Level], wanted: usize) -> Vec<Voxel> {
-    let level = levels.iter().rev().find(|level| level.planes().count() >= FEWEST_PLANES).unwrap_or(&levels[0]);
+    let level = levels.iter().rev().find(|level| level.planes().count() >= wanted).unwrap_or(&levels[0]);
     level.planes().copied().step_by(level.planes().count().div_ceil(wanted).max(1)).collect()
 }

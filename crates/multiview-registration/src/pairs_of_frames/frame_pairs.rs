@@ -71,7 +71,7 @@ impl<'a> Frames<'a> {
 
     /// The pairs that can be trusted, and the others with the reason; in the order of the candidates.
     pub(crate) fn aligned(&self, candidates: &[Candidate]) -> Result<(Vec<FramePair>, Vec<RefusedPair>)> {
-        let near = FrameAligner::new(FrameAlignmentOptions { other_starts: 0, ..self.options.clone() })?;
+        let near = FrameAligner::new(FrameAlignmentOptions { search: false, ..self.options.clone() })?;
         let aligners = (near, FrameAligner::new(self.options.clone())?);
         let each = |(near, wide): &mut (FrameAligner, FrameAligner), candidate: &Candidate| {
             let Candidate { target, source, .. } = *candidate;

@@ -104,7 +104,7 @@ impl Surface {
         let Ok(by_points) = by_points else { return Ok(by_pixels) };
         // Neither is sure: the frames tell which they contradict less.
         let agreement = |result: &IcpResult| {
-            let both = frame_consistency(source, target, &result.target_from_source, CONSISTENCY_STRIDE, None);
+            let both = frame_consistency(source, target, &result.target_from_source, CONSISTENCY_STRIDE);
             both.agreeing.saturating_sub(both.contradicting)
         };
         Ok(if agreement(&by_points) > agreement(&by_pixels) { by_points } else { by_pixels })

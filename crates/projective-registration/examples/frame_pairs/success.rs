@@ -111,8 +111,8 @@ impl Pair {
                  off, open {open:.1?} mm, there {:?}, at the truth {:?}",
                 1e3 * self.sigma_m,
                 self.overlap,
-                frame_consistency(&self.source, &self.target, &found, 4, None),
-                frame_consistency(&self.source, &self.target, &self.truth, 4, None)
+                frame_consistency(&self.source, &self.target, &found, 4),
+                frame_consistency(&self.source, &self.target, &self.truth, 4)
             );
         }
     }

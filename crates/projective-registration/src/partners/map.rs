@@ -7,9 +7,10 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::SAME_SURFACE_COSINE;
 
-use crate::partners::pairs::{Locate, Moved, SinglePose, WithLocate, node_at, with_locate};
+use crate::partners::pairs::{Locate, Moved, WithLocate, node_at, with_locate};
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::BLOCK;
+use rigid_pose::SinglePose;
 
 /// Distances from a plane within this multiple of their standard deviation agree with it.
 pub(crate) const AGREEING_SIGMA: f32 = 4.0;

@@ -7,19 +7,19 @@
 // Arrays are written out: `map` over them stays a call, of which a pair makes dozens.
 #![allow(clippy::needless_range_loop)]
 
+use icp_registration::TUKEY;
 use nalgebra::{Isometry3, Vector3};
+use point_cloud::SAME_SURFACE_COSINE;
 
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::{BLOCK, Grid};
 use crate::preparation::projection::Lens;
 use crate::preparation::table::Table;
+use rigid_pose::SinglePose;
 
 /// Above the number of nodes of any frame: from there on single precision holds whole numbers, in its low bits.
 const TWO_TO_23: f32 = 8_388_608.0;
-
-/// Smallest cosine between the normals of a pair (45 degrees): directions of planes through few noisy nodes scatter by some twenty each.
-const LEAST_COSINE: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
 /// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
 pub(crate) trait Locate: Copy + Sync {
@@ -100,35 +100,14 @@ pub(crate) fn with_locate<W: WithLocate>(frame: &OrganisedFrame, work: W) -> W::
 pub(crate) struct Rules {
     /// Added to the variance of every pair, for what is not yet aligned, m².
     pub extra_variance: f32,
-    /// Residuals beyond this multiple of their standard deviation have no weight (biweight).
-    pub reach: f32,
+    /// Widening of the biweight, beyond whose reach residuals have no weight.
+    pub widening: f32,
 }
 
-/// A pose in single precision.
-#[derive(Clone, Copy)]
-pub(crate) struct SinglePose {
-    rotation: [[f32; 3]; 3],
-    translation: [f32; 3],
-}
-
-impl SinglePose {
-    pub(crate) fn new(pose: &Isometry3<f64>) -> Self {
-        let matrix = pose.rotation.to_rotation_matrix();
-        Self {
-            rotation: [0, 1, 2].map(|r| [0, 1, 2].map(|c| matrix[(r, c)] as f32)),
-            translation: [0, 1, 2].map(|i| pose.translation.vector[i] as f32),
-        }
-    }
-
-    #[inline]
-    pub(crate) fn turned(&self, v: [f32; 3]) -> [f32; 3] {
-        self.rotation.map(|r| r[0] * v[0] + r[1] * v[1] + r[2] * v[2])
-    }
-
-    #[inline]
-    pub(crate) fn moved(&self, point: [f32; 3]) -> [f32; 3] {
-        let turned = self.turned(point);
-        [0, 1, 2].map(|i| turned[i] + self.translation[i])
+impl Rules {
+    /// Residuals beyond this multiple of their standard deviation have no weight.
+    pub(crate) fn reach(self) -> f32 {
+        self.widening * TUKEY as f32
     }
 }
 
@@ -166,8 +145,6 @@ pub(crate) struct Pairs {
     pub variance: [f32; BLOCK],
     /// Weight of the robust kernel, between 0 and 1, over the variance.
     pub weight: [f32; BLOCK],
-    /// Whether the point falls on a target plane at all.
-    pub met: [bool; BLOCK],
     /// Slope of the kernel's influence over the variance.
     pub slope: [f32; BLOCK],
 }
@@ -213,17 +190,16 @@ impl<'a> Moved<'a> {
     pub(crate) fn pairs<L: Locate>(&self, locate: L, block: &Block) -> Pairs {
         let (p, source_normal, planes, distances) = self.compared(locate, block);
         let (centre, per_radius, rules) = (self.centre, self.per_radius, self.rules);
-        let (extra_variance, per_square_reach) = (rules.extra_variance, 1.0 / (rules.reach * rules.reach));
+        let (extra_variance, per_square_reach) = (rules.extra_variance, 1.0 / rules.reach().powi(2));
         let nothing = [0.0; BLOCK];
-        let (mut accepted, mut met) = ([false; BLOCK], [false; BLOCK]);
+        let mut accepted = [false; BLOCK];
         let (mut variance, mut weight, mut slope, mut residual) = (nothing, nothing, nothing, nothing);
         for k in 0..BLOCK {
             variance[k] = distances.variance[k] + extra_variance;
             let information = 1.0 / variance[k];
             let u2 = distances.residual[k] * distances.residual[k] * information * per_square_reach;
             // NaN fails: no partner.
-            accepted[k] = (distances.cosine[k] >= LEAST_COSINE) & (u2 < 1.0);
-            met[k] = u2 >= 0.0;
+            accepted[k] = (distances.cosine[k] >= SAME_SURFACE_COSINE as f32) & (u2 < 1.0);
             let rest = 1.0 - u2;
             let (by_weight, by_slope) = (rest * rest * information, rest * (1.0 - 5.0 * u2) * information);
             weight[k] = if accepted[k] { by_weight } else { 0.0 };
@@ -238,7 +214,7 @@ impl<'a> Moved<'a> {
         }
         let normal = taken(&[planes[0], planes[1], planes[2]], &accepted);
         let (lever, source_normal) = (taken(&lever, &accepted), taken(&source_normal, &accepted));
-        Pairs { normal, source_normal, lever, residual, variance, weight, met, slope }
+        Pairs { normal, source_normal, lever, residual, variance, weight, slope }
     }
 
     /// Where the nodes of a block lie for the target.

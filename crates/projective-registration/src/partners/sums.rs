@@ -201,21 +201,6 @@ impl WithLocate for Sample<'_, '_> {
     }
 }
 
-/// Nodes that fall on target planes, and how many of them are accepted.
-pub(crate) fn agreement(moved: &Moved<'_>, blocks: &[Block]) -> (usize, usize) {
-    let (mut met, mut accepted) = (0, 0);
-    visit(moved, blocks, |pairs| {
-        met += pairs.met.iter().filter(|m| **m).count();
-        accepted += pairs.weight.iter().filter(|w| **w > 0.0).count();
-    });
-    (met, accepted)
-}
-
-/// Calls a function with the pairs of each block.
-pub(crate) fn visit(moved: &Moved<'_>, blocks: &[Block], work: impl FnMut(&Pairs)) {
-    with_locate(moved.target, Visit { moved, blocks, step: 1, work });
-}
-
 /// Calls a function with the pairs of every `step`-th block.
 struct Visit<'a, 'b, F> {
     moved: &'a Moved<'b>,

@@ -9,7 +9,10 @@ use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::STRIDES;
 
 /// Fewest points of a level.
-pub(crate) const FEWEST_POINTS: usize = 200;
+const FEWEST_POINTS: usize = 200;
+
+/// The level of all nodes.
+pub(crate) const LAST_LEVEL: usize = STRIDES.len() - 1;
 
 /// A pose on its way.
 #[derive(Clone)]
@@ -46,9 +49,14 @@ impl<'a> Frames<'a> {
         &self.source.points.blocks
     }
 
+    /// The first level that is passed: one with enough nodes, or the last.
+    pub(crate) fn first_level(self) -> usize {
+        (0..LAST_LEVEL).find(|level| self.source.points.counts[*level] >= FEWEST_POINTS).unwrap_or(LAST_LEVEL)
+    }
+
     /// A quarter of the nodes, where these are enough.
     pub(crate) fn finest_part(self) -> &'a [Block] {
-        let part = STRIDES.len() - 2;
+        let part = LAST_LEVEL - 1;
         if self.source.points.counts[part] >= FEWEST_POINTS { self.blocks(part) } else { self.all_blocks() }
     }
 

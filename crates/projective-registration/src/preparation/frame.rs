@@ -17,8 +17,6 @@ use rigid_pose::{Centred, require_length};
 
 /// Windows whose mean square deviation exceeds that of most by this factor hold no plane.
 const LARGEST_MISFIT: f32 = 3.0;
-/// Smallest cosine between a plane's normal and the ray: in windows across a jump lie steep planes that are none.
-const LEAST_INCIDENCE: f32 = 0.12;
 /// Typical tilt of planes by noise about either axis, radian, beyond which larger nodes are taken: there half of the right
 /// pairs enclose more than 45 degrees, and are refused.
 const LARGEST_TILT: f32 = 0.5;
@@ -268,14 +266,10 @@ impl OrganisedFrame {
         self.noise = scale;
         let limit = LARGEST_MISFIT * if self.has_sigma { typical.max(1.0) } else { typical };
         let nodes = self.planes.par_iter_mut().zip(&mut self.sigma).zip(&self.misfit);
-        let grid = &self.grid;
-        let rays = grid.u.par_iter().zip(&grid.v).zip(&grid.cosine);
-        nodes.zip(rays).with_min_len(4096).for_each(|(((plane, sigma), misfit), ((u, v), cosine))| {
+        nodes.with_min_len(4096).for_each(|((plane, sigma), misfit)| {
             let rounding = ROUNDING * plane[3] / *sigma;
-            let floor = rounding * rounding;
-            let incidence = (plane[0] * u + plane[1] * v - plane[2]) * cosine;
+            let holds = *misfit <= limit + rounding * rounding;
             // NaN fails.
-            let holds = *misfit <= limit + floor && incidence >= LEAST_INCIDENCE;
             if !holds {
                 *plane = [f32::NAN; 4];
             }

@@ -7,23 +7,19 @@ use crate::error::Result;
 use crate::options::FrameAlignmentOptions;
 use crate::partners::pairs::Rules;
 use crate::partners::sums::{SUMS, median_residual, normal_equations};
-use crate::partners::track::{FEWEST_POINTS, Frames, Track, is_within_noise};
+use crate::partners::track::{Frames, LAST_LEVEL, Track, is_within_noise};
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
-use crate::preparation::grid::STRIDES;
 use crate::registration::quality::{Cell, Verdict};
 use crate::shared_error::Sighting;
-use icp_registration::{IcpResult, StopReason, TUKEY};
+use icp_registration::quality::{FEWEST_PAIRS, OPEN};
+use icp_registration::{IcpResult, StopReason};
 use rigid_pose::{Centred, InputError, require_pose, symmetrised};
 
-/// Of the biweight.
-pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
-/// Fewest pairs, and nodes of a frame, that a pose is told by: three an unknown and two more. Frames that overlap have hundreds.
-pub(crate) const FEWEST_PAIRS: usize = 20;
 /// Residuals from which scales are taken.
 pub(crate) const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.
-pub(crate) const COARSE_ITERATIONS: usize = 8;
+const COARSE_ITERATIONS: usize = 8;
 /// First steps, which are least squares over all that is in reach.
 const WIDE_ITERATIONS: usize = 3;
 /// Coarse levels end when a step is below this, in units of the radius.
@@ -82,35 +78,24 @@ impl FrameAligner {
                 return Err(InputError::TooFewPoints { what, found: frame.len(), needed: FEWEST_PAIRS }.into());
             }
         }
-        let rules = Rules { extra_variance: 0.0, reach: BIWEIGHT };
+        let rules = Rules { extra_variance: 0.0, widening: 1.0 };
         let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
         let first = self.follow_levels(track.clone(), frames);
-        if self.options.other_starts == 0 {
-            return first.map(|(_, result)| result);
-        }
-        self.searched(first, &track, frames)
-    }
-
-    /// The first level that is passed; none where all but the last have too few nodes.
-    pub(crate) fn first_level(&self, frames: Frames<'_>) -> Option<usize> {
-        let coarsest = STRIDES.len() - self.options.levels;
-        (coarsest..STRIDES.len() - 1).find(|level| frames.source.points.counts[*level] >= FEWEST_POINTS)
+        if self.options.search { self.searched(first, &track, frames) } else { first.map(|(_, result)| result) }
     }
 
     /// The whole way from the guess.
     fn follow_levels(&mut self, mut track: Track, frames: Frames<'_>) -> Result<(Track, IcpResult)> {
-        match self.first_level(frames) {
-            Some(first) => track = self.start(&track, frames, frames.blocks(first))?,
-            None => self.open(&mut track, frames, frames.all_blocks())?,
-        }
-        self.approach(&mut track, frames)?;
+        let first = frames.first_level();
+        self.open(&mut track, frames, frames.blocks(first))?;
+        self.approach(&mut track, frames, first)?;
         self.end(track, frames)
     }
 
-    /// The levels between the first and the last.
-    pub(crate) fn approach(&mut self, track: &mut Track, frames: Frames<'_>) -> Result<()> {
-        for level in self.first_level(frames).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
+    /// The levels from one on, but for the last.
+    pub(crate) fn approach(&mut self, track: &mut Track, frames: Frames<'_>, first: usize) -> Result<()> {
+        for level in first..LAST_LEVEL {
             self.descend(track, frames, frames.blocks(level), COARSE_ITERATIONS)?;
         }
         Ok(())
@@ -148,7 +133,7 @@ impl FrameAligner {
                 break;
             }
             let wide = track.iterations < WIDE_ITERATIONS;
-            track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
+            track.rules.widening = if wide { 3.0 } else { 1.0 };
             let (step, frame) = self.step(track, frames, blocks, 1e-4)?;
             if !wide {
                 self.narrow(track, frames, blocks);
@@ -192,7 +177,7 @@ impl FrameAligner {
     /// What the pairs of some nodes say about the pose.
     pub(crate) fn verdict(&mut self, track: &Track, frames: Frames<'_>, blocks: &[Block]) -> Result<Verdict> {
         let (moved, frame) = frames.moved(track);
-        let limit_m = self.options.max_motion_sigma_m.unwrap_or(FrameAlignmentOptions::OPEN * frame.radius_m);
+        let limit_m = self.options.max_motion_sigma_m.unwrap_or(OPEN * frame.radius_m);
         Verdict::new(&moved, blocks, limit_m, &mut self.cells)
     }
 
@@ -205,7 +190,7 @@ impl FrameAligner {
             pose = frame.moved(&pose, &normal.equations.step(&track.free, 0.0)?);
         }
         let to_tangent = frame.tangent_from_motion(&pose);
-        let centred = verdict.covariance(frame.radius_m);
+        let centred = verdict.directions.covariance(frame.radius_m, None);
         let stop = if stop == StopReason::MaxIterations && is_within_noise(&track.last_step, &centred) {
             StopReason::WithinNoise
         } else {
@@ -219,8 +204,9 @@ impl FrameAligner {
             iterations: track.iterations,
             stop,
             correspondences: normal.pairs,
-            max_correspondence_distance_m: f64::from(track.rules.reach) * (normal.pairs as f64 / normal.weight).sqrt(),
-            degenerate: verdict.undetermined(&frame),
+            max_correspondence_distance_m: f64::from(track.rules.reach())
+                * (normal.pairs as f64 / normal.weight).sqrt(),
+            degenerate: verdict.directions.undetermined(&frame),
         })
     }
 
@@ -229,7 +215,7 @@ impl FrameAligner {
             found,
             of,
             needed: FEWEST_PAIRS,
-            max_distance_m: f64::from(track.rules.reach * track.rules.extra_variance.sqrt()),
+            max_distance_m: f64::from(track.rules.reach() * track.rules.extra_variance.sqrt()),
             iteration: track.iterations,
         }
     }

@@ -75,8 +75,7 @@ impl Add for FrameConsistency {
 
 /// Compares two frames in both directions at a pose `target_from_source`, without changing it: a test of poses that come
 /// from elsewhere, such as the hypotheses of a relocalisation. `stride`: every how many nodes along columns and rows are
-/// compared, rounded down to 1, 2, 4 or 8. `tolerance_m`: within which distance a node agrees with a plane; noise is added
-/// to it. `None`: 0.04 of the larger frame's radius.
+/// compared, rounded down to 1, 2, 4 or 8. A node agrees with a plane within 0.04 of the larger frame's radius and what noise does.
 ///
 /// A pose that is not finite leaves all nodes out of view.
 pub fn frame_consistency(
@@ -84,11 +83,10 @@ pub fn frame_consistency(
     target: &OrganisedFrame,
     target_from_source: &Isometry3<f64>,
     stride: usize,
-    tolerance_m: Option<f64>,
 ) -> FrameConsistency {
     let level = STRIDES.iter().position(|s| *s <= stride).unwrap_or(STRIDES.len() - 1);
-    let tolerance = tolerance_m.unwrap_or(TOLERANCE * source.points.radius_m.max(target.points.radius_m));
-    consistency(Frames { source, target }, target_from_source, level, tolerance)
+    let radius_m = source.points.radius_m.max(target.points.radius_m);
+    consistency(Frames { source, target }, target_from_source, level, TOLERANCE * radius_m)
 }
 
 /// As [`frame_consistency`], with the number of a level.

@@ -8,4 +8,3 @@ pub(crate) mod places;
 pub(crate) mod quality;
 pub(crate) mod search;
 pub(crate) mod settling;
-pub(crate) mod starts;

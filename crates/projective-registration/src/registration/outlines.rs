@@ -5,11 +5,12 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
 use crate::partners::map::AGREEING_SIGMA;
-use crate::partners::pairs::{Locate, SinglePose, WithLocate, node_at, with_locate};
+use crate::partners::pairs::{Locate, WithLocate, node_at, with_locate};
 use crate::partners::track::{Frames, Track};
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::aligner::FrameAligner;
 use icp_registration::{IcpResult, MotionKind, UndeterminedMotion};
+use rigid_pose::SinglePose;
 
 /// A point contradicts a plane that it lies in front of by this share of the radius and what noise does.
 const TOLERANCE: f64 = 0.025;
@@ -109,7 +110,7 @@ impl FrameAligner {
             // What the geometry does not determine stays.
             let held = self
                 .verdict(&track, frames, frames.all_blocks())
-                .map(|verdict| Track { free: verdict.free(), ..track });
+                .map(|verdict| Track { free: verdict.directions.free(), ..track });
             match held.and_then(|track| self.end(track, frames)) {
                 Ok(other) if outlines.contradicting(&other.1.target_from_source, usize::MAX) <= against => best = other,
                 _ => break,

@@ -3,18 +3,15 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::partners::track::{Frames, Track};
+use crate::partners::track::{Frames, LAST_LEVEL, Track};
 use crate::registration::aligner::FrameAligner;
 use crate::registration::consistency::{DOUBT_LEVEL, TOLERANCE, consistency};
 use crate::registration::search::weighed;
-use crate::registration::starts::{TURN_RAD, TURNS};
 use icp_registration::{MotionKind, UndeterminedMotion};
 
-/// Starts: turned by the angle of the first other starts or about twice of it, and shifted in units of the radius.
-const WIDE_TURN_RAD: f64 = 0.5;
+/// Starts around the guess: turned by this angle, or twice of it, and shifted in units of the radius.
+const TURN_RAD: f64 = 0.26;
 const SHIFT: f64 = 0.22;
-/// Turns that are tried by the wide angle as well.
-const WIDE_TURNS: usize = 6;
 /// Iterations from each start.
 const ITERATIONS: usize = 4;
 /// Places that are kept.
@@ -76,7 +73,10 @@ impl FrameAligner {
     /// Passes the first level from starts all around the guess and keeps the places where the frames agree best.
     pub(crate) fn look_around(&self, start: &Track, frames: Frames<'_>) -> Places {
         let mut places = Places::default();
-        let Some(level) = self.first_level(frames) else { return places };
+        let level = frames.first_level();
+        if level == LAST_LEVEL {
+            return places;
+        }
         let radius = frames.radius_m();
         // Each start on an aligner of its own: what comes out does not hang on the threads.
         let followed = starts(&start.pose, radius).into_par_iter().map_with(self.clone(), |aligner, pose| {
@@ -94,21 +94,13 @@ impl FrameAligner {
     }
 }
 
-/// Poses turned and shifted around one.
+/// Poses turned and shifted around one, in the axes of the source: about its camera, for where it stands is better known than where it
+/// looks. Turned about one axis or two at once, about one of them twice as far as well, and shifted along one.
 fn starts(pose: &Isometry3<f64>, radius_m: f64) -> Vec<Isometry3<f64>> {
-    let turns = TURNS.iter().map(|axis| Vector3::from(*axis) * TURN_RAD);
-    let wide = TURNS[..WIDE_TURNS].iter().map(|axis| Vector3::from(*axis) * WIDE_TURN_RAD);
-    let turns = std::iter::once(Vector3::zeros()).chain(turns).chain(wide);
-    let shifts = |axis: usize| {
-        let shift = if axis == 6 { Vector3::zeros() } else { Vector3::ith(axis / 2, SHIFT * radius_m) };
-        if axis.is_multiple_of(2) { shift } else { -shift }
-    };
-    turns
-        .flat_map(|turn| {
-            (0..7).map(move |axis| {
-                let place = pose.translation.vector + pose.rotation * shifts(axis);
-                Isometry3::from_parts(place.into(), pose.rotation * UnitQuaternion::from_scaled_axis(turn))
-            })
-        })
-        .collect()
+    let all = || (0..27).map(|k| Vector3::new(k % 3, k / 3 % 3, k / 9).map(|step| f64::from(step) - 1.0));
+    let along = |most: f64| all().filter(move |steps| steps.norm_squared() <= most);
+    let twice = along(1.0).filter(|steps| steps.norm_squared() > 0.0).map(|steps| 2.0 * steps);
+    let turns = along(2.0).chain(twice).map(|steps| UnitQuaternion::from_scaled_axis(steps * TURN_RAD));
+    let start = |turn, steps: Vector3<f64>| pose * Isometry3::from_parts((steps * (SHIFT * radius_m)).into(), turn);
+    turns.flat_map(|turn| along(1.0).map(move |steps| start(turn, steps))).collect()
 }

@@ -10,7 +10,7 @@
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 
-use nalgebra::{DMatrix, Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 
 use crate::error::Result;
@@ -18,9 +18,8 @@ use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_lo
 use crate::partners::sums::{self, Normal, derivatives};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};
-use icp_registration::UndeterminedMotion;
-use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
-use rigid_pose::{Centred, symmetric};
+use icp_registration::quality::{Directions, SIGNIFICANCE};
+use rigid_pose::symmetric;
 
 /// What stands out beside cells that carry no information: its multiple of their scatter, and of the middle cell for one that is none of them.
 const CLEAR: f64 = 5.0;
@@ -39,7 +38,7 @@ pub(crate) type Cell = [f64; SUMS];
 
 /// What the pairs say about the pose.
 pub(crate) struct Verdict {
-    directions: Directions,
+    pub(crate) directions: Directions,
     /// The normal equations of the same pairs.
     pub(crate) normal: Normal,
 }
@@ -53,41 +52,14 @@ impl Verdict {
             sum
         }));
         let used = cells.iter().filter(|c| c[6] + c[12] + c[17] != 0.0).count();
-        let score = if used >= FEWEST_CELLS {
-            clustered(cells) * (used as f64 / (used as f64 - 6.0))
-        } else {
-            // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            independent_scores(moved, blocks) * (normal.pairs as f64 / used.max(1) as f64)
-        };
+        // Six cells and fewer stand out from nothing, whatever their scores.
+        let score = clustered(cells) * (used as f64 / (used as f64 - 6.0).max(1.0));
         // Frames that are copies of each other leave no residuals: their noise is still that of their nodes.
         let missing = (LEAST_SCORE - score.trace() / normal.equations.matrix.trace()).max(0.0);
         let score = score + normal.equations.matrix * missing;
         let significant = |motion: &Vector6<f64>, information| is_significant(cells, information, motion);
         let directions = Directions::new(&information, |_| (score, 1.0), significant, ROUNDING, max_sigma_m)?;
         Ok(Self { directions, normal })
-    }
-
-    /// Projection on the determined motions `[dt, rho w]`.
-    pub(crate) fn free(&self) -> Matrix6<f64> {
-        self.directions.free()
-    }
-
-    /// The undetermined motions, sorted into translations and rotations.
-    pub(crate) fn undetermined(&self, frame: &Centred) -> Vec<UndeterminedMotion> {
-        self.directions.undetermined(frame)
-    }
-
-    /// Covariance of motions `[dt, rho w]`; what is not known at all gets the radius as sigma.
-    pub(crate) fn covariance(&self, radius_m: f64) -> Matrix6<f64> {
-        let known: Vec<&Direction> = self.directions.all().iter().filter(|d| d.sigma_m.is_finite()).collect();
-        let (basis, inside) = self.directions.sandwich(&known, |_| None);
-        let known = expanded(&basis, &inside);
-        // Rounding of what nothing is unknown of would outweigh small variances.
-        if basis.ncols() == 6 {
-            return known;
-        }
-        let all = DMatrix::identity(inside.nrows(), inside.nrows());
-        known + (Matrix6::identity() - expanded(&basis, &all)) * radius_m.powi(2)
     }
 }
 
@@ -133,27 +105,6 @@ fn form(upper: &[f64], v: &Vector6<f64>) -> f64 {
         }
     }
     sum
-}
-
-/// Covariance of the summed score of pairs that share nothing.
-fn independent_scores(moved: &Moved<'_>, blocks: &[Block]) -> Matrix6<f64> {
-    let mut sums = [0.0; 21];
-    sums::visit(moved, blocks, |pairs| {
-        let rows = derivatives(&pairs.lever, &pairs.normal);
-        let mut k = 0;
-        for r in 0..6 {
-            for c in r..6 {
-                let mut lane = [0.0_f32; BLOCK];
-                for l in 0..BLOCK {
-                    let score = pairs.weight[l] * pairs.residual[l];
-                    lane[l] = rows[r][l] * rows[c][l] * score * score;
-                }
-                sums[k] += f64::from(sums::across(&lane));
-                k += 1;
-            }
-        }
-    });
-    symmetric(&sums)
 }
 
 /// Sums over the cells, and the normal equations.

@@ -5,6 +5,7 @@ use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use crate::error::Result;
+use crate::partners::map::Agreement;
 use crate::partners::track::{Frames, Track};
 use crate::registration::aligner::FrameAligner;
 use crate::registration::consistency::{DOUBT_LEVEL, FrameConsistency, TOLERANCE, consistency};
@@ -14,8 +15,6 @@ use icp_registration::{IcpResult, MotionKind, StopReason};
 /// Share of the compared nodes that contradict, and of those that are hidden, above which a pose is doubted.
 const MOST_WRONG: f64 = 0.02;
 const MOST_HIDDEN: f64 = 0.08;
-/// Share of all nodes that have to agree.
-const LEAST_AGREEING: f64 = 0.3;
 /// How much the share of contradicting, unclear or hidden nodes takes from what agrees.
 const CONTRADICTION: f64 = 50.0;
 /// What another place must gain: sliding along a wall changes the overlap by percents.
@@ -64,7 +63,7 @@ impl FrameAligner {
         // Each place on an aligner of its own: what comes out does not hang on the threads.
         let approached = places.into_par_iter().map_with(self.clone(), |aligner, place| {
             let mut track = place.clone();
-            aligner.approach(&mut track, frames).ok().map(|()| (merit(&track.pose), track))
+            aligner.approach(&mut track, frames, frames.first_level() + 1).ok().map(|()| (merit(&track.pose), track))
         });
         let approached: Vec<Option<(f64, Track)>> = approached.collect();
         let most = best.as_ref().map_or(0.0, |(_, result)| merit(&result.target_from_source));
@@ -97,7 +96,7 @@ fn agrees(frames: Frames<'_>, result: &IcpResult) -> bool {
     let expected = || 0.5 * compared * (frames.source.unevenness(tolerance) + frames.target.unevenness(tolerance));
     (beside(counts.unclear as f64) || beside((counts.unclear as f64 - expected()).max(0.0)))
         && hidden <= MOST_HIDDEN * (compared + hidden)
-        && counts.agreeing as f64 >= LEAST_AGREEING * counts.all() as f64
+        && counts.agreeing as f64 >= Agreement::LEAST_OVERLAP * counts.all() as f64
 }
 
 /// Agreeing nodes, less the more the frames contradict each other. A share and no sum: on real frames some contradiction

@@ -7,8 +7,9 @@ use crate::error::Result;
 use crate::partners::sums::median_residual;
 use crate::partners::track::{Frames, Track, is_within_noise};
 use crate::preparation::blocks::Block;
-use crate::registration::aligner::{BIWEIGHT, FrameAligner, SAMPLE};
+use crate::registration::aligner::{FrameAligner, SAMPLE};
 use icp_registration::StopReason;
+use icp_registration::quality::SMALL_STEP;
 
 /// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
 /// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
@@ -50,7 +51,7 @@ impl FrameAligner {
             if *narrowings > 0 {
                 continue;
             }
-            let tolerance = self.options.step_tolerance_m.unwrap_or(1e-5 * frame.radius_m);
+            let tolerance = SMALL_STEP * frame.radius_m;
             if step <= tolerance || track.over_sigma <= over_sigma {
                 return Ok(StopReason::Converged);
             }
@@ -78,18 +79,18 @@ impl FrameAligner {
         way: &Vector6<f64>,
     ) -> Result<bool> {
         let verdict = self.verdict(track, frames, blocks)?;
-        Ok(is_within_noise(way, &verdict.covariance(frames.source.centred(&track.pose).radius_m)))
+        let radius_m = frames.source.centred(&track.pose).radius_m;
+        Ok(is_within_noise(way, &verdict.directions.covariance(radius_m, None)))
     }
 
     /// Sets the reach of the kernel from the residuals.
     fn rescale(&mut self, track: &mut Track, frames: Frames<'_>, first: bool) {
         if first {
-            track.rules.reach = 10.0 * BIWEIGHT;
+            track.rules.widening = 10.0;
         }
         let (moved, _) = frames.moved(track);
         let blocks = frames.all_blocks();
         let median = median_residual(&moved, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
-        let scale = (SIGMA_OF_MAD * median).max(0.1) as f32;
-        track.rules.reach = BIWEIGHT * scale;
+        track.rules.widening = (SIGMA_OF_MAD * median).max(0.1) as f32;
     }
 }

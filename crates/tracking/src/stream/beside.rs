@@ -9,16 +9,31 @@ use crate::options::Relocalisation;
 use crate::stream::locate::Measured;
 use crate::stream::tracker::Tracker;
 use global_registration::{CoarseOptions, FeatureCloud, align_without_guess};
+use point_cloud::Cloud;
 
 /// Frames behind the one that is aligned without a guess, after which what was found serves: a third of a second at 30 Hz, in which
 /// an alignment of frames of 640 x 480 ends beside the frames. With fewer the frame has to wait; with more the camera has moved on.
 const FRAMES: usize = 10;
 
-/// Where a keyframe was seen from, and its features for the next time; nothing of what could not be found.
+/// Where a keyframe was seen from by features alone, and its features for the next time; nothing of what could not be found.
 #[derive(Debug, Default)]
-struct Found {
-    features: Option<Arc<FeatureCloud>>,
-    keyframe_from_camera: Option<Isometry3<f64>>,
+pub(crate) struct Found {
+    pub(crate) features: Option<Arc<FeatureCloud>>,
+    pub(crate) keyframe_from_camera: Option<Isometry3<f64>>,
+}
+
+impl Found {
+    /// Of the keyframe the features, or the cloud that they are made from.
+    pub(crate) fn new(source: &Cloud, features: Option<Arc<FeatureCloud>>, keyframe: Option<Cloud>) -> Self {
+        let options = CoarseOptions::default();
+        let made = || FeatureCloud::new(&keyframe?, &options).ok().map(Arc::new);
+        let features = features.or_else(made);
+        let guess = features.as_ref().and_then(|target| {
+            let source = FeatureCloud::new(source, &options).ok()?;
+            align_without_guess(&source, target, &options).ok()
+        });
+        Self { features, keyframe_from_camera: guess.map(|guess| guess.target_from_source) }
+    }
 }
 
 /// An alignment that goes on beside the frames.
@@ -92,23 +107,11 @@ impl Tracker {
             self.beside.pool = ThreadPoolBuilder::new().num_threads(1).build().ok().map(Arc::new);
         }
         let Some(pool) = &self.beside.pool else { return };
-        let keyframe = &self.keyframes.list[k];
-        let (features, number) = (keyframe.features.clone(), keyframe.number);
-        let target = features.is_none().then(|| keyframe.frame.to_cloud());
+        let (number, (features, keyframe)) = (self.keyframes.list[k].number, self.keyframes.list[k].features());
         let (source, found) = (self.current.to_cloud(), Arc::new(OnceLock::new()));
         let told = Arc::clone(&found);
-        pool.spawn(move || {
-            let options = CoarseOptions::default();
-            let made = || FeatureCloud::new(&target?, &options).ok().map(Arc::new);
-            let features = features.or_else(made);
-            let guess = features.as_ref().and_then(|target| {
-                let source = FeatureCloud::new(&source, &options).ok()?;
-                align_without_guess(&source, target, &options).ok()
-            });
-            let keyframe_from_camera = guess.map(|guess| guess.target_from_source);
-            // Nobody else sets it.
-            told.set(Found { features, keyframe_from_camera }).ok();
-        });
+        // Nobody else sets it.
+        pool.spawn(move || drop(told.set(Found::new(&source, features, keyframe))));
         self.beside.search = Some(Search { keyframe: number, frames_left: FRAMES, is_wanted: true, found });
     }
 

@@ -13,13 +13,8 @@ use rigid_pose::Uncertain;
 
 /// Fields of the thumbnails.
 pub(crate) const THUMBNAIL: [usize; 2] = [16, 12];
-/// Keyframes whose overlap with a frame is told.
-const CANDIDATES: usize = 4;
-/// Cosine of the largest angle between the axes of two cameras that can see the same from the same side.
-const LEAST_VIEW_COSINE: f64 = 0.3;
-
-/// Fraction of the nodes of the second frame that lie on the first, at a pose of the second, from about so many of them.
-pub(crate) type Overlap = fn(&OrganisedFrame, &OrganisedFrame, &Isometry3<f64>, usize) -> f64;
+/// Keyframes that a frame is tried with where its own is not enough, those that should see most of the same, or look most like it.
+pub(crate) const CANDIDATES: usize = 4;
 
 /// A frame that others are registered with.
 #[derive(Debug, Clone)]
@@ -29,6 +24,13 @@ pub(crate) struct Keyframe {
     pub(crate) thumbnail: Vec<f32>,
     /// For alignment without a guess; made when first needed.
     pub(crate) features: Option<Arc<FeatureCloud>>,
+}
+
+impl Keyframe {
+    /// Its features, or the cloud that they are made from.
+    pub(crate) fn features(&self) -> (Option<Arc<FeatureCloud>>, Option<Cloud>) {
+        (self.features.clone(), self.features.is_none().then(|| self.frame.to_cloud()))
+    }
 }
 
 /// Where a keyframe number leads to.
@@ -69,27 +71,22 @@ impl Keyframes {
         self.anchors.push(Anchor::Kept);
     }
 
-    /// A few keyframes among `tried` with the fraction of the frame that they would share, as `overlap` tells it, at a pose
-    /// given from keyframe `from`; best first.
+    /// A few keyframes among `tried` with the fraction of the frame that may lie on their surfaces at a pose given from keyframe `from`;
+    /// best first.
     pub(crate) fn candidates(
         &self,
         current: &OrganisedFrame,
         from: usize,
         from_from_camera: &Isometry3<f64>,
         tried: impl Fn(usize) -> bool,
-        overlap: Overlap,
     ) -> Vec<(f64, usize)> {
-        let mut found = Vec::with_capacity(self.list.len());
-        for k in (0..self.list.len()).filter(|k| tried(*k)) {
-            let pose = self.graph.relative(k, from) * from_from_camera;
-            if pose.rotation.to_rotation_matrix()[(2, 2)] > LEAST_VIEW_COSINE {
-                found.push((0.0, k, pose));
-            }
-        }
+        let all = (0..self.list.len()).filter(|k| tried(*k));
+        let mut found: Vec<(f64, usize, Isometry3<f64>)> =
+            all.map(|k| (0.0, k, self.graph.relative(k, from) * from_from_camera)).collect();
         // Few points tell which ones are worth more.
         for most in [Agreement::NODES / 32, Agreement::NODES / 4] {
             for (share, k, pose) in &mut found {
-                *share = overlap(&self.list[*k].frame, current, pose, most);
+                *share = self.list[*k].frame.nearness(current, pose, most, Agreement::LARGEST_ERROR);
             }
             found.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
             found.truncate(CANDIDATES);

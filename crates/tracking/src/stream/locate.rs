@@ -5,16 +5,16 @@ use nalgebra::{Isometry3, Matrix6, Vector6};
 use crate::motion_model::motion::diagonal;
 use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
+use crate::stream::keyframes::CANDIDATES;
 use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
 use pose_graph::{Relation, is_likely};
+use projective_registration::icp_registration::quality::OPEN;
 use projective_registration::{
-    Agreement, ByField, Error as FrameError, Field, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame,
+    Agreement, ByField, Error as FrameError, Field, FrameAligner, Influence, OrganisedFrame,
 };
 use rigid_pose::{InputError, Uncertain, step_pose, symmetrised};
 
-/// Keyframes tried beside the reference.
-const NEIGHBOURS: usize = 2;
 /// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
 const BY_VELOCITY: f64 = 0.25;
 /// Where a frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard deviation at the
@@ -26,11 +26,9 @@ const FEWEST_CONSENTING: f64 = 0.6;
 const LEAST_OVERLAP: f64 = 0.5;
 /// Planes it must share: three make a corner, and corners look alike.
 const LEAST_PLANES: usize = 4;
-/// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, as a standard
-/// deviation: what is carried elsewhere is carried farther.
-const JUMP: f64 = 0.01;
-/// The same of a camera whose velocity is not known.
-const START: f64 = 0.05;
+/// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, or go where its velocity is not known,
+/// as a standard deviation: what is carried elsewhere is carried farther.
+const JUMP: f64 = 0.05;
 
 /// A registration that passed its tests.
 #[derive(Debug, Clone, Copy)]
@@ -52,7 +50,7 @@ pub(crate) struct Measured {
 impl Measured {
     /// Whether the geometry determines all motions well, and nothing speaks against the pose.
     fn is_firm(&self, radius_m: f64) -> bool {
-        self.is_sound() && self.pose.sigma_at(radius_m) <= FrameAlignmentOptions::OPEN * radius_m
+        self.is_sound() && self.pose.sigma_at(radius_m) <= OPEN * radius_m
     }
 
     /// Whether the frames agree at the pose as they do at right ones. Frames that have slid along a wall fit as well, and
@@ -73,9 +71,7 @@ impl Measured {
         let scale = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, radius_m, radius_m, radius_m));
         let back = Matrix6::from_diagonal(&scale.diagonal().map(|s| 1.0 / s));
         let mut motions = symmetrised(&(scale * self.pose.covariance * scale)).symmetric_eigen();
-        for variance in
-            motions.eigenvalues.iter_mut().filter(|v| **v > (FrameAlignmentOptions::OPEN * radius_m).powi(2))
-        {
+        for variance in motions.eigenvalues.iter_mut().filter(|v| **v > (OPEN * radius_m).powi(2)) {
             *variance = variance.max(radius_m * radius_m);
         }
         let covariance = symmetrised(&(back * motions.recompose() * back));
@@ -172,10 +168,10 @@ impl Tracker {
         }
         let others = |k: usize| k != reference;
         let pose = &prediction.own.pose;
-        let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
+        let candidates = self.keyframes.candidates(&self.current, reference, pose, others);
         // In a stream that does not wait, a lost frame tries one of them, in turn.
         let one = self.is_beside() && last.lost_frames > 0;
-        let (passed, tried) = if one { (last.lost_frames % NEIGHBOURS, 1) } else { (0, NEIGHBOURS) };
+        let (passed, tried) = if one { (last.lost_frames % CANDIDATES, 1) } else { (0, CANDIDATES) };
         for (_, k) in candidates.into_iter().skip(passed).take(tried) {
             let guess = self.keyframes.graph.relative(k, reference) * prediction.own.pose;
             if let Ok(measured) = self.try_keyframe(k, &guess)
@@ -234,9 +230,8 @@ impl Tracker {
     fn expects(&self, own: &Uncertain, prediction: &Prediction, lost_frames: usize) -> bool {
         let radius = self.current.radius_m();
         let ungrounded = prediction.grounds == Grounds::Nothing;
-        let jump = if ungrounded { START } else { JUMP };
         let known = if ungrounded { Matrix6::zeros() } else { prediction.own.covariance };
-        let covariance = known + diagonal([(jump * radius).powi(2), jump * jump]);
+        let covariance = known + diagonal([(JUMP * radius).powi(2), JUMP * JUMP]);
         let reachable = Uncertain { covariance, ..prediction.own };
         let relied_on = !ungrounded && prediction.own.sigma_at(radius) <= Self::carried_sigma_m(prediction.grounds);
         (lost_frames == 0 || relied_on) && own.mahalanobis_squared(&reachable).is_some_and(is_likely)
@@ -258,11 +253,6 @@ impl Tracker {
             && self.current.agreement(keyframe, &pose.inverse(), Agreement::NODES).consent() >= Agreement::LEAST_CONSENT
             && keyframe.shared_planes(&self.current, pose, Agreement::NODES) >= LEAST_PLANES
     }
-}
-
-/// Fraction of a frame that agrees with another within the noise.
-pub(crate) fn agreeing(target: &OrganisedFrame, source: &OrganisedFrame, pose: &Isometry3<f64>, most: usize) -> f64 {
-    target.agreement(source, pose, most).overlap()
 }
 
 /// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.

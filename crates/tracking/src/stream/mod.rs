@@ -6,5 +6,4 @@ pub(crate) mod locate;
 pub(crate) mod reference;
 pub(crate) mod returns;
 pub(crate) mod tracker;
-pub(crate) mod unguessed;
 pub(crate) mod wide;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6};
 
-use crate::stream::locate::{Measured, agreeing};
+use crate::stream::locate::Measured;
 use crate::stream::tracker::Tracker;
 use pose_graph::Edge;
 use pose_graph::Relation;
@@ -15,7 +15,7 @@ impl Tracker {
     pub(crate) fn change_reference(&mut self, reference_from_camera: &Relation, influence: Option<&Influence>) {
         let Some(reference) = self.last.as_ref().map(|last| last.keyframe) else { return };
         let (others, pose) = (|k: usize| k != reference, reference_from_camera.pose());
-        let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
+        let candidates = self.keyframes.candidates(&self.current, reference, pose, others);
         if let Some(&(overlap, k)) = candidates.first()
             && overlap >= self.options.keyframe_overlap
             && let Some(measured) = self.closing(k, reference, reference_from_camera)

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use crate::stream::tracker::Tracker;
 use pose_graph::Edge;
-use projective_registration::{Agreement, OrganisedFrame};
+use projective_registration::Agreement;
 
 impl Tracker {
     /// Registers the newest keyframe, which is the current frame, with older ones. Only registrations that fit the path
@@ -15,10 +15,7 @@ impl Tracker {
         }
         let joined: Vec<bool> = (0..=new).map(|k| k == new || self.keyframes.graph.joined(k, new)).collect();
         let others = |k: usize| !joined[k];
-        let near = |keyframe: &OrganisedFrame, current: &OrganisedFrame, pose: &Isometry3<f64>, most| {
-            keyframe.nearness(current, pose, most, Agreement::LARGEST_ERROR)
-        };
-        let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, near);
+        let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others);
         let mut closing = Vec::new();
         for (overlap, k) in candidates.into_iter().take(self.options.loop_attempts) {
             if overlap < Agreement::LEAST_OVERLAP {

@@ -9,7 +9,7 @@ use crate::map::surfaces::SurfaceMap;
 use crate::motion_model::motion::{MotionPrior, diagonal};
 use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
-use crate::options::{Fusion, TrackerOptions};
+use crate::options::TrackerOptions;
 use crate::stream::beside::Beside;
 use crate::stream::keyframes::Keyframes;
 use crate::stream::locate::{Fix, Measured};
@@ -61,7 +61,7 @@ impl Tracker {
         options.validate()?;
         let nothing = vec![[f64::NAN; 3]; projection.width() * projection.height()];
         let mut alignment = options.alignment.clone();
-        alignment.other_starts = 0;
+        alignment.search = false;
         let blank = OrganisedFrame::new(projection, &nothing, None)?;
         Ok(Self {
             shared: alignment.shared_error.unwrap_or_default(),
@@ -297,7 +297,8 @@ impl Tracker {
         let own_relation = Relation { random: total, by_field: measured.by_field() };
         let field = self.field_covariance(measured.influence.as_ref());
         let world = self.keyframes.graph.from(keyframe, &own_relation).total(&field);
-        if self.options.fusion == Fusion::Planes && measured.determined {
+        if measured.determined {
+            // Planes of the keyframe move to the weighted mean of all frames that saw them.
             self.keyframes.list[keyframe].frame.absorb(&self.current, &measured.aligned, &mut self.scratch);
         }
         let pose = TrackedPose {

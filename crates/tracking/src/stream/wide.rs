@@ -3,13 +3,13 @@
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use crate::stream::keyframes::THUMBNAIL;
+use crate::options::Relocalisation;
+use crate::stream::beside::Found;
+use crate::stream::keyframes::{CANDIDATES, THUMBNAIL};
 use crate::stream::locate::Measured;
 use crate::stream::tracker::Tracker;
 use projective_registration::thumbnail_difference;
 
-/// Keyframes that are tried from the look of their thumbnails.
-const TRIED: usize = 3;
 /// Shifts of the thumbnails to each side, fields.
 const SHIFTS: [isize; 2] = [5, 3];
 
@@ -25,8 +25,20 @@ impl Tracker {
 
     /// The current frame from the keyframes that look most like it.
     pub(crate) fn alike(&mut self, ranked: &[(f32, usize, Isometry3<f64>)]) -> Option<Measured> {
-        let tried = if self.is_beside() { 1 } else { TRIED };
+        let tried = if self.is_beside() { 1 } else { CANDIDATES };
         ranked.iter().take(tried).find_map(|(_, k, guess)| self.verified(*k, guess))
+    }
+
+    /// Tries one keyframe a frame without a guess, when everything else has failed: those that look most like the frame first, in turn.
+    fn without_guess(&mut self, ranked: &[(f32, usize, Isometry3<f64>)], lost_frames: usize) -> Option<Measured> {
+        if self.options.relocalisation != Relocalisation::Coarse {
+            return None;
+        }
+        let &(_, k, _) = ranked.get(lost_frames % ranked.len().max(1))?;
+        let (features, keyframe) = self.keyframes.list[k].features();
+        let found = Found::new(&self.current.to_cloud(), features, keyframe);
+        self.keyframes.list[k].features = found.features;
+        self.verified(k, &found.keyframe_from_camera?)
     }
 
     /// Keyframes by the look of their thumbnails, best first, with the rotation that brings the thumbnails together.

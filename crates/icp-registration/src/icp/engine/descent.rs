@@ -16,9 +16,7 @@ use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
 use crate::quality::Free;
 use crate::system::System;
-
-/// Points whose distance at the guess is looked at.
-const GUESS_SAMPLES: usize = 1000;
+use crate::target::SAMPLES;
 
 /// Distance limits from coarse to fine: the last one doubled up to the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +84,7 @@ fn median_distance(engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f6
         let partner = engine.parts.matching.partner(&query);
         Ok(partner.found.then(|| (partner.point - query.moved).norm()))
     };
-    let distances: Result<Vec<Option<f64>>> = thinned(selected, GUESS_SAMPLES).par_iter().map(distance).collect();
+    let distances: Result<Vec<Option<f64>>> = thinned(selected, SAMPLES).par_iter().map(distance).collect();
     Ok(upper_median(&mut distances?.into_iter().flatten().collect::<Vec<f64>>()).max(0.0))
 }
 
@@ -194,7 +192,7 @@ impl<'p> Engine<'p> {
         let mut points = Points::new(sample.to_vec());
         for limit_m in limits {
             for _ in 0..self.parts.levels.iterations {
-                if track.iterations + 1 >= self.parts.stopping.max_iterations {
+                if track.iterations + 1 >= self.parts.max_iterations {
                     return Ok(track);
                 }
                 let moment = track.moment(*limit_m);
@@ -219,7 +217,7 @@ impl<'p> Engine<'p> {
 
     /// Share of the points with a partner at the end of a track, normals or not.
     fn share_with_partner(&self, selected: &[usize], track: &Track, limit_m: f64) -> f64 {
-        let sample = thinned(selected, GUESS_SAMPLES);
+        let sample = thinned(selected, SAMPLES);
         let pose = track.pose;
         let found = sample.par_iter().filter(|&&source| {
             let moved = pose * self.scene.source.points[source];

@@ -7,10 +7,8 @@ use rigid_pose::{InputError, is_usable};
 use crate::error::{Error, Result};
 use crate::icp::engine::registration::Engine;
 use crate::parts::{Moment, Pair, Partner, Query, Scene};
+use crate::system::CHUNK;
 use point_cloud::Cloud;
-
-/// Points handled together by one thread; fixed, so that sums do not depend on the number of threads.
-pub(crate) const CHUNK: usize = 1024;
 
 /// Displacement since the last matching, in spacings of the target, below which answers are worth remembering.
 const SETTLING: f64 = 0.1;

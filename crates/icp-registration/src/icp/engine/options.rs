@@ -1,13 +1,16 @@
 //! What can be chosen in an ICP run.
 
+use std::f64::consts::FRAC_PI_4;
+
 use nalgebra::Matrix6;
 
 use crate::icp::engine::descent::rejections;
-use crate::icp::{Alternative, Levels, Registration, Settled, Starts};
+use crate::icp::{Alternative, Levels, Registration, Starts};
 use crate::kernel::RobustKernel;
 use crate::parts::{
     GaussNewton, PlaneToPlane, PointMatching, PointToPlane, PointToPoint, Selection, SigmaWeight, SymmetricPlanes,
 };
+use crate::quality::FEWEST_PAIRS;
 use crate::result::DegeneracyPolicy;
 use crate::voxels::VoxelAlignmentOptions;
 
@@ -32,7 +35,9 @@ pub enum Metric {
     PlaneToPlane,
 }
 
-/// Options of an ICP run. The defaults carry no scale: distances left at `None` come from the clouds.
+/// Options of an ICP run. The defaults carry no scale: distances left at `None` come from the clouds. Pairs whose normals enclose more
+/// than 45 degrees are refused (the sign of normals does not count), and fewer than 20 tell no pose: parts may say otherwise
+/// ([`Registration`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct IcpOptions {
     /// What is minimised. Default: [`Metric::Automatic`].
@@ -50,14 +55,8 @@ pub struct IcpOptions {
     pub kernel: RobustKernel,
     /// Fraction of the pairs that is kept, those with the smallest distances `[Chetverikov2002]`. Default 1: all.
     pub trim: f64,
-    /// Pairs whose normals enclose a larger angle are refused, radian (the sign of normals does not count).
-    /// Default 45 degrees; `None`: normals are not compared.
-    pub max_normal_angle_rad: Option<f64>,
     /// Iterations in all levels together. Default 100.
     pub max_iterations: usize,
-    /// The run has converged when the step moves points at the cloud's radius by less than this, metre. `None`, the
-    /// default: 1e-5 of that radius.
-    pub step_tolerance_m: Option<f64>,
     /// What happens to undetermined motions. Default: [`DegeneracyPolicy::Report`].
     pub degeneracy: DegeneracyPolicy,
     /// Covariance of the guess in the tangent `[dt target axes (m), dtheta source axes (rad)]`, needed and used only
@@ -66,8 +65,6 @@ pub struct IcpOptions {
     /// A motion counts as undetermined when the predicted standard deviation of points at the cloud's radius exceeds
     /// this, metre. `None`, the default: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
-    /// Fewest pairs. Default 20.
-    pub min_correspondences: usize,
 }
 
 impl Default for IcpOptions {
@@ -79,13 +76,10 @@ impl Default for IcpOptions {
             initial_correspondence_distance_m: None,
             kernel: RobustKernel::Welsch,
             trim: 1.0,
-            max_normal_angle_rad: Some(std::f64::consts::FRAC_PI_4),
             max_iterations: 100,
-            step_tolerance_m: None,
             degeneracy: DegeneracyPolicy::Report,
             prior_covariance: None,
             max_motion_sigma_m: None,
-            min_correspondences: 20,
         }
     }
 }
@@ -93,25 +87,21 @@ impl Default for IcpOptions {
 impl IcpOptions {
     /// The same by voxels; `None` where an option asks for single points, or there are too few.
     pub(in crate::icp) fn by_voxels(&self, points: usize) -> Option<VoxelAlignmentOptions> {
-        let usual = Self::default();
         let dense = points >= DENSE && self.metric == Metric::Automatic && self.selection == Selection::All;
-        let whole =
-            self.trim.to_bits() == usual.trim.to_bits() && self.max_normal_angle_rad == usual.max_normal_angle_rad;
+        let whole = self.trim.to_bits() == 1.0_f64.to_bits();
         let free = self.max_correspondence_distance_m.is_none() && self.degeneracy != DegeneracyPolicy::HoldAtPrior;
         (dense && whole && free).then_some(VoxelAlignmentOptions {
             max_start_error_m: self.initial_correspondence_distance_m,
             kernel: self.kernel,
             max_iterations: self.max_iterations,
-            step_tolerance_m: self.step_tolerance_m,
             degeneracy: self.degeneracy,
             max_motion_sigma_m: self.max_motion_sigma_m,
-            min_correspondences: self.min_correspondences,
         })
     }
 
     /// The parts that stand for these options.
     pub(in crate::icp) fn with_matching<'a>(&self, matching: impl PointMatching + 'a) -> Registration<'a> {
-        let angle = self.max_normal_angle_rad;
+        let angle = Some(FRAC_PI_4);
         let trim = if self.trim.to_bits() == 1.0_f64.to_bits() { None } else { Some(self.trim) };
         let robust = if self.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
         let mut alternatives = Alternative::usual(robust, angle, trim);
@@ -121,7 +111,6 @@ impl IcpOptions {
                 alternative.metric = Some(Box::new(PointToPlane));
             }
         }
-        let (max_iterations, step_tolerance_m) = (self.max_iterations, self.step_tolerance_m);
         Registration {
             selection: Box::new(self.selection),
             matching: Box::new(matching),
@@ -142,11 +131,11 @@ impl IcpOptions {
             },
             starts: Some(Starts::default()),
             alternatives,
-            stopping: Settled { max_iterations, step_tolerance_m, ..Settled::default() },
+            max_iterations: self.max_iterations,
             degeneracy: self.degeneracy,
             prior_covariance: self.prior_covariance,
             max_motion_sigma_m: self.max_motion_sigma_m,
-            min_correspondences: self.min_correspondences,
+            min_correspondences: FEWEST_PAIRS,
         }
     }
 }

@@ -7,13 +7,12 @@ use crate::icp::IcpOptions;
 use crate::icp::engine::descent::{Alternative, Levels};
 use crate::icp::engine::matching::Points;
 use crate::icp::engine::quality::verdict;
-use crate::icp::settled::Settled;
 use crate::icp::starts::Starts;
 use crate::kernel::RobustKernel;
 use crate::parts::{
     ErrorMetric, Minimiser, Moment, NearestPoint, PairRejection, PairWeighting, PointMatching, PointSelection, Scene,
 };
-use crate::quality::{Free, OPEN, Verdict};
+use crate::quality::{Free, OPEN, SMALL_STEP, Verdict};
 use crate::result::DegeneracyPolicy;
 use crate::result::{IcpResult, StopReason};
 use crate::system::System;
@@ -21,6 +20,9 @@ use crate::target::IcpTarget;
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 use rigid_pose::{InputError, motion_length, require_pose};
+
+/// Steps after which it is asked whether they still shrink.
+const PATIENCE: usize = 10;
 
 /// An ICP registration of which every part can be replaced: the stages of `[RusinkiewiczLevoy2001]`.
 ///
@@ -47,8 +49,9 @@ pub struct Registration<'a> {
     /// Other kernels and rejections for the way down the levels; where there are any, they replace those above until the
     /// last level, and the pose at which most of a sample fits goes on.
     pub alternatives: Vec<Alternative<'a>>,
-    /// When the last level ends.
-    pub stopping: Settled,
+    /// Iterations in all levels together. The last level ends before, when a step moves points at the target's radius by less than 1e-5 of
+    /// it, or when steps no longer shrink and stay far below the noise. Default 100.
+    pub max_iterations: usize,
     /// What happens to motions that the geometry does not determine.
     pub degeneracy: DegeneracyPolicy,
     /// Covariance of the guess in the tangent `[dt target axes, dtheta source axes]`, for
@@ -160,18 +163,18 @@ impl<'p> Engine<'p> {
 
     /// Iterates on all selected points at the last limit.
     fn settle(&self, track: &mut Track, points: &mut Points, limit_m: f64) -> Result<StopReason> {
-        let stopping = &self.parts.stopping;
-        let tolerance_m = stopping.step_tolerance_m.unwrap_or(1e-5 * self.scene.target.radius_m);
+        let tolerance_m = SMALL_STEP * self.scene.target.radius_m;
         let mut lengths = Vec::new();
-        while track.iterations < stopping.max_iterations {
+        while track.iterations < self.parts.max_iterations {
             let step = self.step(track, &track.moment(limit_m), points)?;
             lengths.push(motion_length(&step));
             if motion_length(&step) <= tolerance_m {
                 return Ok(StopReason::Converged);
             }
-            if stopping.no_longer_shrink(&lengths) {
+            let first = lengths.len().checked_sub(PATIENCE).filter(|_| lengths.len().is_multiple_of(PATIENCE));
+            if first.is_some_and(|first| motion_length(&step) >= 0.5 * lengths[first]) {
                 let verdict = self.verdict(&track.moment(limit_m), points, track.iterations)?;
-                if verdict.over_sigma(&step) <= stopping.noise_fraction {
+                if verdict.over_sigma(&step) <= 0.1 {
                     return Ok(StopReason::WithinNoise);
                 }
             }

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::error::{Error, Result};
 
 /// Cells along an axis: three indices of 21 bit make one key.
-const CELLS: f64 = 2_097_152.0;
+pub(crate) const CELLS: f64 = 2_097_152.0;
 /// Free cells below the smallest index, so that neighbours have an index too; a multiple of every level's cell.
 const MARGIN: f64 = 256.0;
 /// Beyond this, the position inside a cell is lost to rounding.

@@ -108,7 +108,7 @@ pub enum Error {
     /// Nowhere enough points on a plane.
     #[error(
         "no surface among {points} points in {cells} cells of {voxel_m} m ({per_cell:.1} a cell, extent {extent_m:.3} m): \
-         take {} cells, or give the points in metre", other_cells(.voxel_m, .extent_m)
+         give the points in metre, or take cells with ten points and more of which a surface has many"
     )]
     NoSurface {
         /// Points.
@@ -136,8 +136,3 @@ pub enum Error {
 }
 
 pub(crate) type Result<T> = std::result::Result<T, Error>;
-
-/// Which cells serve rather than those in which nothing was found: a surface has four on its side and more.
-fn other_cells(voxel_m: &f64, extent_m: &f64) -> &'static str {
-    if 4.0 * voxel_m > *extent_m { "smaller" } else { "larger" }
-}

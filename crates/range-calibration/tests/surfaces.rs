@@ -66,28 +66,35 @@ fn what_is_not_there_is_not_found() {
 }
 
 #[test]
-fn one_wall_is_refused() {
+fn one_wall_names_what_it_leaves_open() {
     // Two stations beside each other that see one wall of the room.
     let poses = [
         round::room::look_at([-0.3, 0.2, 1.9], [-0.3, -2.0, 1.9]),
         round::room::look_at([0.2, 0.2, 1.9], [0.2, -2.0, 1.9]),
     ];
-    let frames = round::frames(&poses, &round::model(&[("d0", 0.024)]), 3);
-    let captures: Vec<SurfaceCapture<'_>> = frames
-        .iter()
-        .zip(&poses)
-        .map(|(frame, pose)| SurfaceCapture { name: "wall", frame, world_from_camera: Some(*pose) })
-        .collect();
-    let options = SurfaceCalibrationOptions { largest_sigma_m: 1e-3, ..SurfaceCalibrationOptions::default() };
-    let known = round::model(&[]);
-    let refused = calibrate_surfaces(&captures, &round::camera(), &known, Datum::Station(0), &options, &|_, _| {});
-    println!("{:?}", refused.as_ref().err());
-    // The bulge of a wall tells an offset if walls are plane, but nothing holds the stations along it.
-    let is_refused = matches!(
-        refused,
-        Err(Error::SurfacesNotDetermined { .. } | Error::SurfacesNotSettled { .. } | Error::Registration { .. })
-    );
-    assert!(is_refused);
+    let mut answered = 0;
+    for seed in 1..=5 {
+        let frames = round::frames(&poses, &round::model(&[("d0", 0.024)]), seed);
+        let captures: Vec<SurfaceCapture<'_>> = frames
+            .iter()
+            .zip(&poses)
+            .map(|(frame, pose)| SurfaceCapture { name: "wall", frame, world_from_camera: Some(*pose) })
+            .collect();
+        let options = SurfaceCalibrationOptions { largest_sigma_m: 1e-3, ..SurfaceCalibrationOptions::default() };
+        let known = round::model(&[]);
+        let found = calibrate_surfaces(&captures, &round::camera(), &known, Datum::Station(0), &options, &|_, _| {});
+        let found = match found {
+            Err(Error::SurfacesNotDetermined { term, .. }) if term == "d0" => continue,
+            found => found.unwrap(),
+        };
+        answered += 1;
+        // The bulge of a wall tells an offset if walls are plane, but nothing holds the stations along it.
+        let open = &found.after.undetermined[0];
+        assert!(open.station == 1 && open.motions[0].axis.x.abs() > 0.99, "{open:?}");
+        let (d0, sigma) = (found.shared().values[0], found.shared().covariance[0][0].sqrt());
+        assert!((d0 - 0.024).abs() < 4.0 * sigma && sigma < 1e-3, "{d0} +- {sigma}");
+    }
+    assert!(answered >= 3, "{answered}");
 }
 
 #[test]

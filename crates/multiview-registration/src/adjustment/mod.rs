@@ -6,6 +6,7 @@ pub(crate) mod joint_covariance;
 pub(crate) mod known;
 pub(crate) mod network;
 pub(crate) mod precision;
+pub(crate) mod relaxation;
 pub(crate) mod rounds;
 pub(crate) mod simultaneous;
 pub(crate) mod turns;

@@ -9,6 +9,7 @@ use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::equations::{Equations, MOST_ELIMINATED};
 use crate::adjustment::known::Known;
 use crate::adjustment::network::{Network, State, largest_step};
+use crate::adjustment::relaxation::Relaxation;
 use crate::adjustment::rounds::{Surfaces, meet, near_each_other};
 use crate::error::Result;
 use crate::planes::contacts::Reach;
@@ -49,6 +50,8 @@ pub(crate) struct Adjusted {
     pub factor: f64,
     pub rounds: usize,
     pub settled: bool,
+    /// Part of the last step that was taken.
+    pub share: f64,
     /// What stations have in common; empty until the last round.
     pub common: Common,
     /// Pairs of stations that were held against each other.
@@ -134,6 +137,7 @@ impl Finish<'_> {
     ) -> Result<Adjusted> {
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
         let (mut known, mut round, mut pairs_tried) = (Vec::new(), 0, 0);
+        let mut relaxation = Relaxation::default();
         loop {
             surfaces.update(&state.parameters)?;
             surfaces.place(points, &state.parameters)?;
@@ -150,7 +154,9 @@ impl Finish<'_> {
             let (slack_m, stride) = if first { (OFF[0] * size_m, FIRST_STRIDE) } else { (0.0, 1) };
             let gate = Gate { slack_m, stride, parameters: state.parameters.len() };
             let sums = sightings(points, &state.poses, &known, gate);
-            let adjusted = self.step(&state, known, sums)?;
+            // Rounds from other shared planes do not undo each other.
+            let relaxation = off_m.is_none().then_some(&mut relaxation);
+            let adjusted = self.step(&state, known, sums, relaxation)?;
             round += 1;
             (self.progress)(round);
             let settled = off_m.is_none() && self.settles(&state, &adjusted);
@@ -164,10 +170,10 @@ impl Finish<'_> {
     }
 
     /// Whether no station moved by more than the tolerance, or by so much of its standard deviation that further rounds tell
-    /// something: along a direction that the surfaces leave open, poses drift with every change of weights.
+    /// something: along a direction that the surfaces leave open, poses drift with every change of weights. Steps count whole.
     fn settles(&self, before: &State, adjusted: &Adjusted) -> bool {
-        let Adjusted { state: after, cofactors, .. } = adjusted;
-        if largest_step(before, after, self.network.hold_m) <= self.tolerance_m {
+        let Adjusted { state: after, cofactors, share, .. } = adjusted;
+        if largest_step(before, after, self.network.hold_m) <= share * self.tolerance_m {
             return true;
         }
         // Of many stations the wider factor takes as long as a round; without it what is asked here is stricter.
@@ -177,7 +183,7 @@ impl Finish<'_> {
             let own = cofactors.of(k) * factor;
             let sigmas = own.cholesky().map_or(f64::INFINITY, |factor| step.dot(&factor.solve(&step)).sqrt());
             // Not a number is no small one.
-            k == self.network.fixed || sigmas <= FEW_SIGMAS
+            k == self.network.fixed || sigmas <= share * FEW_SIGMAS
         };
         (0..after.poses.len()).all(is_settled)
     }
@@ -194,8 +200,14 @@ impl Finish<'_> {
         (means, scatter)
     }
 
-    /// One linearised step of all unknowns.
-    fn step(&self, state: &State, mut known: Vec<SharedPlane>, sums: Vec<Sums>) -> Result<Adjusted> {
+    /// One linearised step of all unknowns, or the part of it that does not lead there and back.
+    fn step(
+        &self,
+        state: &State,
+        mut known: Vec<SharedPlane>,
+        sums: Vec<Sums>,
+        relaxation: Option<&mut Relaxation>,
+    ) -> Result<Adjusted> {
         let observers = observers(&known, &sums);
         let (means, scatter) = Self::scatter(&known, &sums, &observers);
         let variances: Vec<Variances> = means.par_iter().map(|means| variances(means, scatter.shared)).collect();
@@ -208,6 +220,10 @@ impl Finish<'_> {
             .collect();
         let seen = known.iter().zip(&eliminated).filter_map(|(plane, eliminated)| Some((plane, eliminated.as_ref()?)));
         let (step, cofactors) = self.solved(state, seen)?;
+        // Metres and radians in one: as rotations move what is a metre away.
+        let of_poses = step.rows(0, 6 * state.poses.len()).into_owned();
+        let share = relaxation.map_or(1.0, |relaxation| relaxation.share(of_poses));
+        let step = share * step;
         for (shared_plane, eliminated) in known.iter_mut().zip(&eliminated) {
             if let Some(eliminated) = eliminated {
                 let motions = motions(shared_plane, eliminated, &state.poses, &step);
@@ -227,6 +243,7 @@ impl Finish<'_> {
             factor: 1.0,
             rounds: 0,
             settled: false,
+            share,
             common: Common::default(),
             pairs_tried: 0,
         })

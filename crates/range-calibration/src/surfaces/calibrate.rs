@@ -67,10 +67,8 @@ pub fn calibrate_surfaces(
         held.push(HeldTerm { name: HYPERBOLA.to_owned(), combination, sigma_m: f64::INFINITY });
     }
     let (after, shared) = network.estimate(&mut model, &mut held, &before)?;
-    // With the terms left out, stations may go back and forth between what these bend. Where that is not since surfaces leave them
-    // free, only how they end counts.
-    let is_free = !before.settled && !after.undetermined.is_empty();
-    if !after.settled || is_free {
+    // With the terms left out, stations may go back and forth between what these bend: only how they end counts.
+    if !after.settled {
         return Err(Error::SurfacesNotSettled { rounds: [before.rounds, after.rounds] });
     }
     let camera = model.camera_at(&shared.values);
@@ -129,13 +127,8 @@ impl Network<'_> {
     fn register(&self, start: Start<'_>, model: Option<&SensorModel<'_>>) -> Result<StationRegistration> {
         let model = model.map(|model| model as &dyn multiview_registration::PointModel);
         let options = StationRegistrationOptions { model, ..self.options.registration.clone() };
-        let registered = |start: Start<'_>| {
-            register_stations(self.clouds, start, self.datum, &options, self.progress)
-                .map_err(|error| Error::registration("all stations", error))
-        };
-        let first = registered(start)?;
-        // Weights that change from round to round may keep stations moving: they are given a second go from where they came to.
-        if first.settled { Ok(first) } else { registered(Start::Poses(&first.world_from_station)) }
+        register_stations(self.clouds, start, self.datum, &options, self.progress)
+            .map_err(|error| Error::registration("all stations", error))
     }
 
     /// Registers with the terms until what is left of them is determined, and the amplitude's part has its shape.

@@ -162,7 +162,8 @@ fn shared<'t>(texts: &[(&'t str, &'t str)]) -> Vec<(&'t str, &'t str)> {
         found.extend(open.map(|(name, ..)| (module, name)));
     }
     let stays = |name: &str| {
-        let handed_on = |text: &str| uses(text).any(|own| own.starts_with("pub") && names(own).any(|word| word == name));
+        let handed_on =
+            |text: &str| uses(text).any(|own| own.starts_with("pub") && names(own).any(|word| word == name));
         texts.iter().any(|(_, text)| is_part(name, text) || handed_on(text))
     };
     found.retain(|(_, name)| !stays(name));
@@ -335,7 +336,8 @@ mod tests {
 
     #[test]
     fn constants_that_other_files_use_are_called_there() {
-        let home = "pub(crate) const FAR: f64 = 2.0;\npub(crate) const WIDE: usize = 5;\npub(crate) const OUT: f64 = 1.0;\n";
+        let home =
+            "pub(crate) const FAR: f64 = 2.0;\npub(crate) const WIDE: usize = 5;\npub(crate) const OUT: f64 = 1.0;\n";
         let user = "//! Uses.\n\nuse crate::home::{\n    FAR,\n    WIDE,\n};\npub(crate) use crate::home::OUT;\nfn f(a: [f64; WIDE]) -> f64 {\n    FAR * home::FAR * other::FAR * OUT\n}\n";
         let shared = shared(&[("folder/home", home), ("folder/user", user)]);
         assert_eq!(shared, [("home", "FAR")], "one is a length, one is handed on");
@@ -343,6 +345,9 @@ mod tests {
         assert_eq!(constants, [Constant { path: "folder/home::FAR".to_owned(), value: "2.0".to_owned() }]);
         assert!(opened.contains("pub(crate) fn FAR() -> f64") && opened.contains("const WIDE: usize = 5;"), "{opened}");
         let (opened, _) = opened_file(user, "folder/user", &shared);
-        assert!(opened.contains("\n    FAR,\n") && opened.contains("FAR() * home::FAR() * other::FAR * OUT"), "{opened}");
+        assert!(
+            opened.contains("\n    FAR,\n") && opened.contains("FAR() * home::FAR() * other::FAR * OUT"),
+            "{opened}"
+        );
     }
 }

@@ -22,7 +22,7 @@ const REFINED: usize = 3;
 /// Steps onto the planes, each with points given to them anew, and what poses may be off before the last, patches.
 const STEPS: usize = 4;
 const OFF: f64 = 0.1;
-/// By which the other of the two may speak against it: as often as one time in forty by chance.
+/// Deviations by which the other of the two may speak against it: as often as one time in forty by chance. Half and twice change nothing.
 pub(crate) const AGAINST_IT: f64 = 2.0;
 
 /// A place of the station, with how many of its points lie on what the others saw.

@@ -4,8 +4,8 @@ use nalgebra::Isometry3;
 use rigid_pose::pose_difference;
 use statistics::{CHI_MEDIANS, upper_median};
 
-/// Part of a patch from where the last rounds find their way: neither are start poses taken to be better known, nor is what they leave open.
-/// Half of it changes no digit of stations in a room, of buildings and of a Kinect's frames, simulated and real.
+/// Part of a patch from where the last rounds find their way: start poses are not taken to be better known, and what planes leave open is held by
+/// as much. Where it bounds start poses, a quarter and half of it change no digit in a building or among a Kinect's clouds.
 pub(crate) const NEAR: f64 = 0.5;
 
 /// Standard deviations beyond which nothing is by chance: of measured turns, of where a station began (one in a million is farther off along

@@ -1,6 +1,6 @@
 //! `cargo xtask sensitivity [WORD ...]`: what a statistic says where constants of a crate are other ones.
 //!
-//! A copy of the repository is built once in which every private constant that is a number is read from the environment, but
+//! A copy of the repository is built once in which every constant that is a number, and not public, is read from the environment, but
 //! for lengths of arrays; the example then runs with each of them at multiples of its value (counts: rounded, at least 1). What `docs/benchmarks.md` says of constants
 //! comes from here.
 
@@ -127,13 +127,17 @@ fn copy_of_repository(folder: &Path, copy: &Path) -> Outcome {
 
 /// Has every constant of the crate read from the environment; the constants.
 fn opened(source: &Path) -> Result<Vec<Constant>, String> {
-    let mut constants = Vec::new();
+    let mut texts = Vec::new();
     for file in files(source)? {
-        let failed = |error: std::io::Error| format!("{}: {error}", file.display());
-        let text = std::fs::read_to_string(&file).map_err(failed)?;
+        let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
         let name = file.strip_prefix(source).unwrap_or(&file).with_extension("").to_string_lossy().into_owned();
-        let (text, found) = opened_file(&text, &name);
-        std::fs::write(&file, text).map_err(failed)?;
+        texts.push((file, name, text));
+    }
+    let shared = shared(&texts.iter().map(|(_, name, text)| (name.as_str(), text.as_str())).collect::<Vec<_>>());
+    let mut constants = Vec::new();
+    for (file, name, text) in &texts {
+        let (text, found) = opened_file(text, name, &shared);
+        std::fs::write(file, text).map_err(|error| format!("{}: {error}", file.display()))?;
         constants.extend(found);
     }
     let library = source.join("lib.rs");
@@ -149,41 +153,90 @@ fn opened(source: &Path) -> Result<Vec<Constant>, String> {
     Ok(constants)
 }
 
-/// A file in which private constants with a number for a value are functions, and these constants.
-fn opened_file(text: &str, file: &str) -> (String, Vec<Constant>) {
-    let found: Vec<(&str, &str, &str)> = text.lines().filter_map(declaration).collect();
-    // A constant that others, or lengths of arrays, are made of stays.
-    let is_part = |name: &str| {
-        let is_constant = |line: &&str| line.contains("const ") && declaration(line).is_none();
-        let is_length = |line: &&str| {
-            let behind = |part: &str| part.split_once(']').is_some_and(|(length, _)| length.contains(name));
-            line.split("; ").skip(1).any(behind) || line.contains(&format!("<{name}"))
-        };
-        let others = text.lines().filter(|line| is_constant(line) || is_length(line));
-        others.flat_map(|line| line.split(|c: char| !is_of_name(c))).any(|word| word == name)
+/// Module and name of the constants that other files of the crate use as they are: neither handed on, nor a part of others.
+fn shared<'t>(texts: &[(&'t str, &'t str)]) -> Vec<(&'t str, &'t str)> {
+    let mut found = Vec::new();
+    for (file, text) in texts {
+        let module = file.trim_end_matches("/mod").rsplit('/').next().unwrap_or(file);
+        let open = text.lines().filter(|line| line.starts_with("pub(")).filter_map(declaration);
+        found.extend(open.map(|(name, ..)| (module, name)));
+    }
+    let stays = |name: &str| {
+        let handed_on =
+            |text: &str| uses(text).any(|own| own.starts_with("pub") && names(own).any(|word| word == name));
+        texts.iter().any(|(_, text)| is_part(name, text) || handed_on(text))
     };
-    let found: Vec<_> = found.into_iter().filter(|(name, ..)| !is_part(name)).collect();
-    let lines = text.lines().map(|line| match declaration(line) {
-        Some((name, kind, value)) if found.iter().any(|other| other.0 == name) => format!(
-            "#[allow(non_snake_case)]\nfn {name}() -> {kind} {{\n    static VALUE: std::sync::OnceLock<{kind}> = \
-             std::sync::OnceLock::new();\n    *VALUE.get_or_init(|| {})\n}}",
-            if kind == "usize" {
-                format!("(({value} as f64 * crate::constant_times(\"{file}::{name}\")).round() as usize).max(1)")
-            } else {
-                format!("{value} * crate::constant_times(\"{file}::{name}\") as {kind}")
-            }
-        ),
-        _ if line.trim_start().starts_with("//") => line.to_owned(),
-        _ => called(line, &found.iter().map(|other| other.0).collect::<Vec<_>>()),
+    found.retain(|(_, name)| !stays(name));
+    found
+}
+
+/// The `use` statements of a file.
+fn uses(text: &str) -> impl Iterator<Item = &str> {
+    let is_use = |own: &&str| own.starts_with("use ") || own.starts_with("pub") && own.contains(" use ");
+    text.split(';').map(|own| own.trim_start().rsplit("\n\n").next().unwrap_or(own)).filter(is_use)
+}
+
+fn names(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !is_of_name(c))
+}
+
+/// Whether other constants, or lengths of arrays, are made of a constant.
+fn is_part(name: &str, text: &str) -> bool {
+    let is_constant = |line: &&str| line.contains("const ") && declaration(line).is_none();
+    let is_length = |line: &&str| {
+        let behind = |part: &str| part.split_once(']').is_some_and(|(length, _)| length.contains(name));
+        line.split("; ").skip(1).any(behind) || line.contains(&format!("<{name}"))
+    };
+    // In braces it is a part of a message.
+    let in_text = |line: &&str| line.contains(&format!("{{{name}}}"));
+    let others = text.lines().filter(|line| is_constant(line) || is_length(line) || in_text(line));
+    others.flat_map(names).any(|word| word == name)
+}
+
+/// A file in which constants with a number for a value are functions, and these constants; `shared`: module and name of those that others use.
+fn opened_file(text: &str, file: &str, shared: &[(&str, &str)]) -> (String, Vec<Constant>) {
+    let found: Vec<_> = text.lines().filter_map(|line| opened_line(line, text, shared)).collect();
+    let imported = |&&(module, name): &&(&str, &str)| {
+        uses(text).any(|own| names(own).any(|word| word == module) && names(own).any(|word| word == name))
+    };
+    let own = found.iter().map(|own| own[1]).chain(shared.iter().filter(imported).map(|other| other.1));
+    let own: Vec<&str> = own.collect();
+    let mut is_use = false;
+    let lines = text.lines().map(|line| {
+        is_use |= line.starts_with("use ") || line.starts_with("pub") && line.contains(" use ");
+        let stays = is_use || line.trim_start().starts_with("//");
+        is_use &= !line.contains(';');
+        match opened_line(line, text, shared) {
+            _ if stays => line.to_owned(),
+            Some([visibility, name, kind, value]) => format!(
+                "#[allow(non_snake_case)]\n{visibility}fn {name}() -> {kind} {{\n    static VALUE: std::sync::OnceLock<{kind}> = \
+                 std::sync::OnceLock::new();\n    *VALUE.get_or_init(|| {})\n}}",
+                if kind == "usize" {
+                    format!("(({value} as f64 * crate::constant_times(\"{file}::{name}\")).round() as usize).max(1)")
+                } else {
+                    format!("{value} * crate::constant_times(\"{file}::{name}\") as {kind}")
+                }
+            ),
+            None => called(line, &own, shared),
+        }
     });
-    let constants =
-        found.iter().map(|(name, _, value)| Constant { path: format!("{file}::{name}"), value: (*value).to_owned() });
+    let constants = found.iter().map(|own| Constant { path: format!("{file}::{}", own[1]), value: own[3].to_owned() });
     (lines.collect::<Vec<_>>().join("\n") + "\n", constants.collect())
 }
 
-/// Name, type and value of `const NAME: f64 = 0.5;` at the beginning of a line; counts are of at least 2.
+/// Visibility, name, type and value of a constant that is opened.
+fn opened_line<'l>(line: &'l str, text: &str, shared: &[(&str, &str)]) -> Option<[&'l str; 4]> {
+    let (name, kind, value) = declaration(line)?;
+    let visibility = line.split_once("const ")?.0;
+    let is_shared = shared.iter().any(|other| other.1 == name);
+    let opens = if visibility.is_empty() { !is_part(name, text) } else { is_shared };
+    opens.then_some([visibility, name, kind, value])
+}
+
+/// Name, type and value of `const NAME: f64 = 0.5;` at the beginning of a line, public in the crate at most; counts are of at least 2.
 fn declaration(line: &str) -> Option<(&str, &str, &str)> {
-    let (name, rest) = line.strip_prefix("const ")?.split_once(": ")?;
+    let private = ["pub(crate) ", "pub(super) "].iter().find_map(|visibility| line.strip_prefix(visibility));
+    let (name, rest) = private.unwrap_or(line).strip_prefix("const ")?.split_once(": ")?;
     let (kind, value) = rest.strip_suffix(';')?.split_once(" = ")?;
     let is_number = value.replace('_', "").parse::<f64>().is_ok_and(f64::is_finite);
     let is_count = kind == "usize" && value.parse::<usize>().is_ok_and(|count| count > 1);
@@ -194,16 +247,17 @@ const fn is_of_name(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_'
 }
 
-/// The line with each of these names called as a function, but for those behind a path.
-fn called(line: &str, names: &[&str]) -> String {
+/// The line with each of these names called as a function; behind a path only those of `shared` behind their module.
+fn called(line: &str, names: &[&str], shared: &[(&str, &str)]) -> String {
     let mut text = String::new();
     let mut rest = line;
     while !rest.is_empty() {
         let end = rest.find(|c: char| !is_of_name(c)).unwrap_or(rest.len());
         let (word, behind) = rest.split_at(end);
         text.push_str(word);
-        let is_other = text[..text.len() - word.len()].ends_with("::");
-        if names.contains(&word) && !is_other {
+        let path = text[..text.len() - word.len()].strip_suffix("::");
+        let is_of = |path: &str| shared.iter().any(|(module, name)| *name == word && names_last(path) == *module);
+        if path.map_or(names.contains(&word), is_of) {
             text.push_str("()");
         }
         let next = behind.find(is_of_name).unwrap_or(behind.len());
@@ -211,6 +265,11 @@ fn called(line: &str, names: &[&str]) -> String {
         rest = &behind[next..];
     }
     text
+}
+
+/// The last name of a path.
+fn names_last(path: &str) -> &str {
+    path.rsplit(|c: char| !is_of_name(c)).next().unwrap_or(path)
 }
 
 fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
@@ -264,14 +323,31 @@ mod tests {
     }
 
     #[test]
-    fn private_constants_are_opened_and_their_uses_called() {
+    fn constants_are_opened_and_their_uses_called() {
         let text = "/// Share.\nconst SHARE: f64 = 0.5;\npub const OPEN: f64 = 1.0;\nconst COUNT: usize = 3;\nstruct S([u8; 2 * COUNT]);\nconst MOST: usize = 4;\nconst A: f32 = 2.0;\nconst B: f32 = A * 3.0;\nfn f() -> f64 {\n    // SHARE of all\n    SHARE * other::SHARE + MY_SHARE\n}\n";
-        let (opened, constants) = opened_file(text, "folder/file");
+        let (opened, constants) = opened_file(text, "folder/file", &[]);
         let of = |name: &str, value: &str| Constant { path: format!("folder/file::{name}"), value: value.to_owned() };
         assert_eq!(constants, [of("SHARE", "0.5"), of("MOST", "4")]);
         assert!(opened.contains("fn MOST() -> usize") && opened.contains("const COUNT: usize = 3;"), "{opened}");
         assert!(opened.contains("fn SHARE() -> f64"), "{opened}");
         assert!(opened.contains("    SHARE() * other::SHARE + MY_SHARE"), "{opened}");
         assert!(opened.contains("// SHARE of all") && opened.contains("const A: f32 = 2.0;"), "{opened}");
+    }
+
+    #[test]
+    fn constants_that_other_files_use_are_called_there() {
+        let home =
+            "pub(crate) const FAR: f64 = 2.0;\npub(crate) const WIDE: usize = 5;\npub(crate) const OUT: f64 = 1.0;\n";
+        let user = "//! Uses.\n\nuse crate::home::{\n    FAR,\n    WIDE,\n};\npub(crate) use crate::home::OUT;\nfn f(a: [f64; WIDE]) -> f64 {\n    FAR * home::FAR * other::FAR * OUT\n}\n";
+        let shared = shared(&[("folder/home", home), ("folder/user", user)]);
+        assert_eq!(shared, [("home", "FAR")], "one is a length, one is handed on");
+        let (opened, constants) = opened_file(home, "folder/home", &shared);
+        assert_eq!(constants, [Constant { path: "folder/home::FAR".to_owned(), value: "2.0".to_owned() }]);
+        assert!(opened.contains("pub(crate) fn FAR() -> f64") && opened.contains("const WIDE: usize = 5;"), "{opened}");
+        let (opened, _) = opened_file(user, "folder/user", &shared);
+        assert!(
+            opened.contains("\n    FAR,\n") && opened.contains("FAR() * home::FAR() * other::FAR * OUT"),
+            "{opened}"
+        );
     }
 }

@@ -6,7 +6,7 @@ use super::cloud::VoxelCloud;
 use super::level::Level;
 use super::options::VoxelAlignmentOptions;
 use super::pairs::{Matcher, Pair, Partners, System, matched};
-use super::wide::{RULES, Wide};
+use super::wide::Wide;
 use crate::error::Result;
 use crate::kernel::RobustKernel;
 use crate::quality::{Cells, FEWEST_PAIRS, Free, OPEN, SMALL_STEP, Verdict};
@@ -97,19 +97,8 @@ impl<'a> Run<'a> {
         }
         let wide = Wide::new(&self.source.levels, &self.target.levels, self.source.radius_m);
         let first = self.options.max_start_error_m.unwrap_or(0.5 * self.target.radius_m);
-        let (guess, judge) = (self.pose, matchers[matchers.len().saturating_sub(3)]);
-        let last = 0.5 * matchers[0].target.size_m;
-        let mut best = f64::NEG_INFINITY;
-        let mut steps = 0;
-        for rule in RULES {
-            let (pose, taken) = wide.descend(&guess, rule, first, last)?;
-            steps += taken;
-            let system = self.system(judge, &pose, Partners::Anew, RobustKernel::None);
-            let fit = system.fit(0.1 * judge.target.size_m);
-            if fit > best {
-                (best, self.pose) = (fit, pose);
-            }
-        }
+        let (pose, steps) = wide.descend(&self.pose, first, 0.5 * matchers[0].target.size_m)?;
+        self.pose = pose;
         self.iterations += steps;
         Ok(())
     }

@@ -172,11 +172,6 @@ impl<'a> System<'a> {
         }
         if total > 0.0 { (squares / total).sqrt() } else { f64::NAN }
     }
-
-    /// How well the pairs fit: their number, each weighted by its residual over `scale_m`.
-    pub fn fit(&self, scale_m: f64) -> f64 {
-        matched(self.pairs).map(|p| 1.0 / (1.0 + (p.residual / scale_m).powi(2))).sum()
-    }
 }
 
 pub(crate) fn matched(pairs: &[Pair]) -> impl Iterator<Item = &Pair> + Clone {

@@ -14,16 +14,12 @@ const TARGET_SAMPLES: usize = 1000;
 /// Factor of the scale from one step to the next.
 const FALL: f64 = 0.8;
 
-/// How much directions count in pairing, and how much the distance along the plane counts in the step.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Rule {
-    pub direction: f64,
-    pub along: f64,
-}
-
-/// Rules that are tried; the pose that fits best goes on.
-pub(crate) const RULES: [Rule; 3] =
-    [Rule { direction: 0.0, along: 0.3 }, Rule { direction: 1.0, along: 0.1 }, Rule { direction: 4.0, along: 0.03 }];
+/// How much the squared sine between normals counts in pairing, beside the squared distance over the scale. Without it a sixth less of a
+/// Kinect's pairs come right; half and twice are as good.
+const DIRECTION: f64 = 4.0;
+/// How much the distance along the plane counts in the step, beside that across. Half and twice are as good, within three
+/// of 120 simulated pairs and one of 116 of a Kinect.
+const ALONG: f64 = 0.03;
 
 /// Samples of two clouds.
 pub(crate) struct Wide {
@@ -39,17 +35,11 @@ impl Wide {
     }
 
     /// The pose reached from `guess` while the scale falls from `first_m` to `last_m`, and the steps it took.
-    pub fn descend(
-        &self,
-        guess: &Isometry3<f64>,
-        rule: Rule,
-        first_m: f64,
-        last_m: f64,
-    ) -> Result<(Isometry3<f64>, usize)> {
+    pub fn descend(&self, guess: &Isometry3<f64>, first_m: f64, last_m: f64) -> Result<(Isometry3<f64>, usize)> {
         let (mut pose, mut scale, mut steps) = (*guess, first_m, 0);
         while scale > last_m {
             let Some(frame) = self.frame(&pose) else { break };
-            let step = self.step(&pose, rule, scale, frame)?;
+            let step = self.step(&pose, scale, frame)?;
             let length = step.norm() / (2.0 * scale);
             pose = frame.moved(&pose, &(step / length.max(1.0)));
             steps += 1;
@@ -64,11 +54,11 @@ impl Wide {
             .then_some(Centred { radius_m: self.radius_m, ..about })
     }
 
-    fn step(&self, pose: &Isometry3<f64>, rule: Rule, scale: f64, frame: Centred) -> Result<Vector6<f64>> {
+    fn step(&self, pose: &Isometry3<f64>, scale: f64, frame: Centred) -> Result<Vector6<f64>> {
         let mut equations = MotionEquations::default();
         let sought = |voxel: &Voxel| {
             let (place, normal) = (pose * voxel.mean, pose.rotation * voxel.normal);
-            Sought { place, normal, scale_m: scale, direction: rule.direction }
+            Sought { place, normal, scale_m: scale, direction: DIRECTION }
         };
         let sought: Vec<Sought> = self.source.iter().map(sought).collect();
         for (&Sought { place: moved, normal, .. }, index) in sought.iter().zip(self.target.nearest(&sought)) {
@@ -79,7 +69,7 @@ impl Wide {
             let bisector = (target.normal + normal * cosine.signum()).normalize();
             equations.add(&frame.derivative(&moved.coords, &bisector), weight, bisector.dot(&offset));
             for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
-                equations.add(&frame.derivative(&moved.coords, &axis), weight * rule.along, axis.dot(&offset));
+                equations.add(&frame.derivative(&moved.coords, &axis), weight * ALONG, axis.dot(&offset));
             }
         }
         // What is next to the planes' distances holds every motion: nothing needs damping.

@@ -4,9 +4,11 @@ use crate::agreement::placement::{FEWEST_STATIONS, PairAgreement};
 use rayon::prelude::*;
 use statistics::{Distribution, upper_median};
 
-/// Fewest sampled points seen in common by which a station is judged.
+/// Fewest sampled points seen in common by which a station is judged: at four times what is usual eight of them contradict. Half and twice as
+/// many change no verdict in rooms, buildings, and sets of a Kinect's frames: all see more in common.
 const FEWEST_POINTS: usize = 100;
-/// Contradicting for each agreeing point that are usual even where the others have fewer: voxels beside edges.
+/// Contradicting for each agreeing point that are usual even where the others have fewer: voxels beside edges. Half and twice as many change how
+/// often what is usual eight stations of a room are contradicted by as much (1.0 to 1.3; 0.5 to 1.6), and no verdict there or among frames.
 const USUAL: f64 = 0.02;
 
 /// Agreeing and contradicting points.

@@ -21,7 +21,8 @@ use statistics::Distribution;
 
 /// How often what is usual in the survey a station must be contradicted to be doubted.
 const DOUBTED: f64 = 4.0;
-/// Fewest stations of which one can be told from the others: of four, one in the wrong place spoils half of the pairs.
+/// Fewest stations of which one can be told from the others: of four, one in the wrong place spoils half of the pairs. Asking
+/// for ten leaves the eight of a room unjudged.
 pub(crate) const FEWEST_STATIONS: usize = 5;
 
 /// Probability at which any of many stations in their places is doubted, were their odds normal about their median. Measured upwards in

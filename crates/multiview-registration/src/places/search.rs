@@ -22,7 +22,7 @@ use crate::relative_pose::RelativePose;
 use crate::surfaces::points::StationPoints;
 
 /// Of so many points that lie on planes one is held against the rays of others.
-const STRIDE: usize = 8;
+pub(crate) const RAY_STRIDE: usize = 8;
 /// Deviation of a relative pose beyond which two stations do not hold each other, patches: shared planes are joined within as much.
 pub(crate) const LOOSE: f64 = 0.05;
 
@@ -61,7 +61,7 @@ impl<'a> Places<'a> {
             let space = FreeSpace::new(&points.points.iter().zip(&points.sigma).map(free_to).collect::<Vec<_>>());
             let tiles = Sighting::new(points, pose, planes, gate).sums_and_tiles(&wide, &members[station]).1;
             let on_planes = points.points.iter().zip(tiles).filter(|(_, tile)| *tile != NOWHERE);
-            Look { space, seen: on_planes.map(|(point, _)| *point).step_by(STRIDE).collect() }
+            Look { space, seen: on_planes.map(|(point, _)| *point).step_by(RAY_STRIDE).collect() }
         };
         let looks: Vec<Look> = (0..points.len()).into_par_iter().map(look).collect();
         let looked_through = LookedThrough::new(looks, pairs(adjusted));

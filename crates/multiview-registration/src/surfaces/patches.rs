@@ -26,7 +26,8 @@ const NEIGHBOURS: usize = 13;
 const REACH: f64 = 1.8;
 /// Points farther from their patch than this multiple of the median distance are left out of it.
 const GROSS: f64 = 5.0;
-/// The same for the angle (its sine) between the normals of point and patch, and an angle that is always allowed.
+/// The same for the angle (its sine) between the normals of point and patch, and an angle that is always allowed. Half, twice and no limit at all
+/// leave simulated stations as they are; of clouds of a Kinect fewer come together without a doubt, as far off as before.
 const LEAN: f64 = 2.5;
 const SMALLEST_LEAN: f64 = 0.6;
 /// Variance of a patch, in those around it, beyond which it is no plane. Twenty points scatter by a factor of two.

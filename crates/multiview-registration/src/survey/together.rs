@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 use statistics::upper_median;
 
-use crate::adjustment::known::Known;
+use crate::adjustment::known::{Known, NEAR};
 use crate::adjustment::network::{Network, State};
 use crate::adjustment::precision;
 use crate::adjustment::rounds::{Surfaces, WideRounds};
@@ -81,7 +81,7 @@ pub(crate) fn brought_together<'a>(
     let moved = if whole { Isometry3::identity() } else { framed(&mut near, network.fixed, &start[network.fixed]) };
     let mut finish = Finish {
         network: &network,
-        near: Known::at(patch_m / 2.0, radius_m),
+        near: Known::at(NEAR * patch_m, radius_m),
         tolerance_m: patch_m / TOLERANCE,
         progress: &total,
         joints: Vec::new(),

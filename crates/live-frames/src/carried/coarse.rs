@@ -125,7 +125,7 @@ fn add_rows(rows: &[f32], sums: &mut [f32]) -> bool {
     for (sum, value) in sums.iter_mut().zip(pairs.remainder()) {
         *sum += value;
     }
-    sums.iter().fold(0_u32, |any, sum| any | u32::from(!(sum.abs() <= f32::MAX))) == 0
+    sums.iter().fold(1_u32, |all, sum| all & u32::from(sum.abs() <= f32::MAX)) == 1
 }
 
 /// Sums and numbers of the values that are finite.

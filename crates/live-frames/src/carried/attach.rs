@@ -1,11 +1,8 @@
 //! Pixels without a count take that of a neighbour: of one on the same surface, or at last of any.
 
-// Without branches, all neighbours are compared at once.
-#![allow(clippy::needless_range_loop, clippy::needless_bitwise_bool)]
-
 use range_image::Raster;
 
-use crate::carried::pixels::{HELD, OPEN, RIM, apart, gentle_steps};
+use crate::carried::pixels::{HELD, OPEN, RIM, apart, is_gentle};
 use phase_unwrap::{wrap_step, wrapped};
 
 /// Sweeps forth and back over the pixels without a count. What is revealed at the edge of a surface is reached in the first;
@@ -87,11 +84,12 @@ impl Attaching<'_> {
         let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
         let unwrapped = |pixel: usize| phase[pixel] + std::f32::consts::TAU * self.wraps[pixel] as f32;
         let own = unwrapped(pixel);
-        let beyond = |other: usize| match self.state[other] {
-            HELD | RIM => apart([own, unwrapped(other)], [amplitude[pixel], amplitude[other]], self.noise2),
-            state => state == OPEN,
-        };
-        let at_edge = self.sides(pixel).into_iter().any(beyond);
+        let mut at_edge = false;
+        for other in self.sides(pixel) {
+            let (state, brightness) = (self.state[other], [amplitude[pixel], amplitude[other]]);
+            let known = state == HELD || state == RIM;
+            at_edge |= state == OPEN || known && apart([own, unwrapped(other)], brightness, self.noise2);
+        }
         if at_edge {
             self.state[pixel] = RIM;
             self.unwrapped[pixel] = f32::NAN;
@@ -146,23 +144,18 @@ impl Attaching<'_> {
     /// wished), and that neighbour. The pixel itself does not hold.
     fn nearest(&self, pixel: usize, on_surface: bool) -> Option<(i32, usize)> {
         let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
-        let sides = self.sides(pixel);
-        let held = [0, 1, 2, 3].map(|k: usize| self.state[sides[k]] == HELD);
-        if held == [false; 4] {
-            return None;
+        let (own, brightness) = (phase[pixel], amplitude[pixel]);
+        let mut best = None;
+        let mut least = f32::INFINITY;
+        for other in self.sides(pixel) {
+            if self.state[other] != HELD {
+                continue;
+            }
+            let step = wrapped(own - phase[other]).abs();
+            if step < least && (!on_surface || is_gentle(step, [amplitude[other], brightness], self.noise2)) {
+                (least, best) = (step, Some(other));
+            }
         }
-        let phases = [phase[sides[0]], phase[sides[1]], phase[sides[2]], phase[sides[3]]];
-        let steps = if on_surface {
-            let amplitudes = [amplitude[sides[0]], amplitude[sides[1]], amplitude[sides[2]], amplitude[sides[3]]];
-            gentle_steps(phases, amplitudes, [phase[pixel], amplitude[pixel]], self.noise2)
-        } else {
-            phases.map(|other| wrapped(phase[pixel] - other).abs())
-        };
-        let mut best = (f32::INFINITY, 4);
-        for k in 0..4 {
-            best = if held[k] & (steps[k] < best.0) { (steps[k], k) } else { best };
-        }
-        let other = *sides.get(best.1)?;
-        Some((self.wraps[other] + wrap_step(phase[other], phase[pixel]), other))
+        best.map(|other| (self.wraps[other] + wrap_step(phase[other], own), other))
     }
 }

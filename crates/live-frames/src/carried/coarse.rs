@@ -87,25 +87,57 @@ fn means(plane: &Raster<f32>, factor: usize, [sums, counts]: &mut [Vec<f32>; 2],
     let (width, columns) = (plane.width(), out.width());
     for (rows, out) in plane.as_slice().chunks(factor * width).zip(out.as_mut_slice().chunks_mut(columns)) {
         let (sums, counts) = (&mut sums[..width], &mut counts[..width]);
+        let pixels = rows.len() / width;
+        let complete = with_wide_registers(
+            #[inline(always)]
+            || add_rows(rows, sums),
+        );
+        if complete {
+            for (out, sums) in out.iter_mut().zip(sums.chunks(factor)) {
+                *out = sums.iter().sum::<f32>() / (pixels * sums.len()) as f32;
+            }
+            continue;
+        }
         with_wide_registers(
             #[inline(always)]
-            || {
-                sums.fill(0.0);
-                counts.fill(0.0);
-                for row in rows.chunks_exact(width) {
-                    for ((sum, count), value) in sums.iter_mut().zip(counts.iter_mut()).zip(row) {
-                        let finite = value.abs() <= f32::MAX;
-                        *sum += if finite { *value } else { 0.0 };
-                        *count += if finite { 1.0 } else { 0.0 };
-                    }
-                }
-            },
+            || add_finite(rows, sums, counts),
         );
-        let pixels = rows.len() / width;
         for (out, (sums, counts)) in out.iter_mut().zip(sums.chunks(factor).zip(counts.chunks(factor))) {
             let (sum, count) = (sums.iter().sum::<f32>(), counts.iter().sum::<f32>());
             let enough = 2.0 * count > (pixels * sums.len()) as f32;
             *out = if enough { sum / count } else { f32::NAN };
+        }
+    }
+}
+
+/// Sums of rows, two at a time, and whether all of them are finite, as they are where every pixel has a value.
+#[inline(always)]
+fn add_rows(rows: &[f32], sums: &mut [f32]) -> bool {
+    let width = sums.len();
+    sums.fill(0.0);
+    let mut pairs = rows.chunks_exact(2 * width);
+    for pair in &mut pairs {
+        let (first, second) = pair.split_at(width);
+        for ((sum, first), second) in sums.iter_mut().zip(first).zip(second) {
+            *sum = *sum + first + second;
+        }
+    }
+    for (sum, value) in sums.iter_mut().zip(pairs.remainder()) {
+        *sum += value;
+    }
+    sums.iter().fold(1_u32, |all, sum| all & u32::from(sum.abs() <= f32::MAX)) == 1
+}
+
+/// Sums and numbers of the values that are finite.
+#[inline(always)]
+fn add_finite(rows: &[f32], sums: &mut [f32], counts: &mut [f32]) {
+    sums.fill(0.0);
+    counts.fill(0.0);
+    for row in rows.chunks_exact(sums.len()) {
+        for ((sum, count), value) in sums.iter_mut().zip(counts.iter_mut()).zip(row) {
+            let finite = value.abs() <= f32::MAX;
+            *sum += if finite { *value } else { 0.0 };
+            *count += if finite { 1.0 } else { 0.0 };
         }
     }
 }

@@ -126,7 +126,7 @@ struct Row<'a> {
 }
 
 /// Pixels taken at a time, so that the compiler can vectorise.
-const LANES: usize = 64;
+const LANES: usize = 32;
 
 impl Row<'_> {
     /// Compares all pixels; whether any contradicts or has no count.
@@ -151,6 +151,12 @@ impl Row<'_> {
         let state = self.state[start..].first_chunk::<L>()?;
         let confidence = self.confidence[start..].first_chunk_mut::<L>()?;
         let doubts = self.doubts[start..].first_chunk_mut::<L>()?;
+        if agree(spread, phase, wraps, state, doubts) {
+            for i in 0..L {
+                confidence[i] = if confidence[i] > sure[i] { confidence[i] } else { sure[i] };
+            }
+            return Some(0);
+        }
         // As wide as the values that they are compared with.
         let (mut states, mut counted) = ([0_u32; L], [0_u32; L]);
         for i in 0..L {
@@ -159,8 +165,7 @@ impl Row<'_> {
         }
         let mut any = [0_u32; L];
         for i in 0..L {
-            let count = ((spread[i] - phase[i]) * (1.0 / TAU) + ROUND) - ROUND;
-            let agrees = (count - wraps[i] as f32).abs() < 0.5;
+            let agrees = is_count(wraps[i], spread[i], phase[i]);
             let known = states[i] == u32::from(HELD);
             let aside = (states[i] == u32::from(RIM)) & agrees;
             let own = confidence[i];
@@ -175,4 +180,30 @@ impl Row<'_> {
         }
         Some(any.iter().fold(0, |all, one| all | one))
     }
+}
+
+/// Whether all pixels hold, agree and were not contradicted before, as in nearly all blocks.
+#[inline(always)]
+fn agree<const L: usize>(
+    spread: &[f32; L],
+    phase: &[f32; L],
+    wraps: &[i32; L],
+    state: &[u8; L],
+    doubts: &[u8; L],
+) -> bool {
+    let (mut other, mut all) = (0, u32::MAX);
+    for i in 0..L {
+        other |= (state[i] ^ HELD) | doubts[i];
+    }
+    for i in 0..L {
+        all &= u32::from(is_count(wraps[i], spread[i], phase[i])).wrapping_neg();
+    }
+    (other == 0) & (all != 0)
+}
+
+/// Whether a count is the one that the small image gives a phase.
+#[inline(always)]
+fn is_count(wraps: i32, spread: f32, phase: f32) -> bool {
+    let count = ((spread - phase) * (1.0 / TAU) + ROUND) - ROUND;
+    (count - wraps as f32).abs() < 0.5
 }

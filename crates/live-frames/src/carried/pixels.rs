@@ -4,8 +4,6 @@
 
 use std::f32::consts::TAU;
 
-use phase_unwrap::wrapped;
-
 /// No phase.
 pub(crate) const MASKED: u8 = 0;
 /// The check failed: the count is not known yet.
@@ -62,8 +60,8 @@ pub(crate) struct Tally {
     pub open: u32,
 }
 
-/// Pixels taken at a time, so that the compiler can vectorise.
-const LANES: usize = 32;
+/// Pixels taken at a time, so that the compiler can vectorise; few, since one that fails takes the others the long way.
+const LANES: usize = 16;
 
 /// Predicts each pixel's count as the one that brings its phase nearest to what was known last, and checks it: the phase may
 /// not step far, and amplitude times range squared not change.
@@ -109,6 +107,12 @@ fn carry_pixels<const L: usize>(
     limits: Limits,
     tally: &mut Tally,
 ) {
+    if hold_steady(phase, amplitude, unwrapped, before, wraps, limits) {
+        *before = *amplitude;
+        *state = [HELD; L];
+        tally.used = tally.used.wrapping_add(L as u32);
+        return;
+    }
     let [mut told, mut used, mut open] = [[0_u32; L]; 3];
     let mut counts = [0.0_f32; L];
     for i in 0..L {
@@ -151,40 +155,75 @@ fn carry_pixels<const L: usize>(
     tally.open = tally.open.wrapping_add(open.iter().fold(0, |sum: u32, one| sum.wrapping_add(*one)));
 }
 
-/// Standard deviations of a step between pixels of two amplitudes that count as noise, rad.
+/// Takes over counts and unwrapped phases of this frame where all pixels hold by the limits that apply whatever the noise is, as
+/// they do in most blocks, and says whether they do. It spares the roots and quotients that tell the noise.
 #[inline(always)]
-fn noise_margin(a: f32, b: f32, noise2: f32) -> f32 {
-    let (a2, b2) = (a * a, b * b);
-    SIGMAS * (noise2 * (a2 + b2) / (a2 * b2)).sqrt()
+fn hold_steady<const L: usize>(
+    phase: &[f32; L],
+    amplitude: &[f32; L],
+    unwrapped: &mut [f32; L],
+    before: &[f32; L],
+    wraps: &mut [i32; L],
+    limits: Limits,
+) -> bool {
+    let (mut missed, mut now, mut counts) = ([0_u32; L], [0.0_f32; L], [0.0_f32; L]);
+    for i in 0..L {
+        let (p, a, known, earlier) = (phase[i], amplitude[i], unwrapped[i], before[i]);
+        counts[i] = ((known - p) * (1.0 / TAU) + ROUND) - ROUND;
+        now[i] = p + TAU * counts[i];
+        let (brightness, brightness_before) = (a * now[i] * now[i], earlier * known * known);
+        let steady = ((now[i] - known).abs() <= STEADY_RAD)
+            & (brightness <= STEADY_RATIO * brightness_before)
+            & (brightness_before <= STEADY_RATIO * brightness)
+            & (counts[i] >= 0.0)
+            & (counts[i] <= limits.maximum_wraps)
+            & (limits.noise2 <= DARK_VARIANCE * (a * a));
+        missed[i] = u32::from(!steady);
+    }
+    if missed.iter().fold(0, |any, one| any | one) != 0 {
+        return false;
+    }
+    *unwrapped = now;
+    for i in 0..L {
+        wraps[i] = ((counts[i] + ROUND).to_bits() & 0xff) as i32;
+    }
+    true
 }
 
-/// The sizes of the steps from neighbours to a pixel (phase and amplitude) where they can lie on one surface; infinite where they
-/// cannot.
+/// Whether a step between two neighbours of these amplitudes can lie on one surface. Squares are compared, which needs no root and
+/// no quotient; amplitudes from 1e-9 to 1e9 keep within single precision.
 #[inline(always)]
-pub(crate) fn gentle_steps(
-    phases: [f32; 4],
-    amplitudes: [f32; 4],
-    [phase, amplitude]: [f32; 2],
-    noise2: f32,
-) -> [f32; 4] {
-    let mut steps = [f32::INFINITY; 4];
-    for k in 0..4 {
-        let (a, b) = (amplitudes[k], amplitude);
-        let step = wrapped(phase - phases[k]).abs();
-        let margin = noise_margin(a, b, noise2);
-        let ratio = STEADY_RATIO * (1.0 + margin);
-        // Neighbours lie on a slope, which the step in time does not see.
-        let limit = if margin > SLOPE_RAD { margin } else { SLOPE_RAD };
-        // Whatever the noise is, or where it is not known.
-        let alike = (step <= SLOPE_RAD) & (a <= STEADY_RATIO * b) & (b <= STEADY_RATIO * a);
-        let gentle = alike | ((step <= limit) & (a <= ratio * b) & (b <= ratio * a));
-        steps[k] = if gentle { step } else { f32::INFINITY };
+pub(crate) fn is_gentle(step: f32, [a, b]: [f32; 2], noise2: f32) -> bool {
+    // Whatever the noise is, or where it is not known.
+    if (step <= SLOPE_RAD) & (a <= STEADY_RATIO * b) & (b <= STEADY_RATIO * a) {
+        return true;
     }
-    steps
+    // Neighbours lie on a slope, which the step in time does not see.
+    let near = (step <= SLOPE_RAD) | (scaled(step, [a, b]) <= noise_of_step([a, b], noise2));
+    // Not beyond the steady ratio by more than noise makes of it.
+    let alike = |a: f32, b: f32| {
+        let over = a - STEADY_RATIO * b;
+        (over <= 0.0) | (over * over * a * a <= STEADY_RATIO * STEADY_RATIO * noise_of_step([a, b], noise2))
+    };
+    near & alike(a, b) & alike(b, a)
 }
 
 /// Whether two neighbours with these unwrapped phases lie on two surfaces.
-pub(crate) fn apart(unwrapped: [f32; 2], [a, b]: [f32; 2], noise2: f32) -> bool {
+#[inline(always)]
+pub(crate) fn apart(unwrapped: [f32; 2], amplitudes: [f32; 2], noise2: f32) -> bool {
     let step = (unwrapped[1] - unwrapped[0]).abs();
-    step > SLOPE_RAD && step > noise_margin(a, b, noise2)
+    (step > SLOPE_RAD) & (scaled(step, amplitudes) > noise_of_step(amplitudes, noise2))
+}
+
+/// Square of a step times both squared amplitudes.
+#[inline(always)]
+fn scaled(step: f32, [a, b]: [f32; 2]) -> f32 {
+    let scaled = step * a * b;
+    scaled * scaled
+}
+
+/// Square of the standard deviations of a step that count as noise, in the same scale.
+#[inline(always)]
+fn noise_of_step([a, b]: [f32; 2], noise2: f32) -> f32 {
+    SIGMAS * SIGMAS * noise2 * (a * a + b * b)
 }

@@ -245,9 +245,13 @@ impl Channel<'_> {
         with_wide_registers(
             #[inline(always)]
             || {
-                in_lanes(row.phase.len(), |start, lanes| {
-                    if lanes { row.pixels::<LANES>(start, limits) } else { row.pixels::<1>(start, limits) }
-                });
+                in_lanes(
+                    row.phase.len(),
+                    #[inline(always)]
+                    |start, lanes| {
+                        if lanes { row.pixels::<LANES>(start, limits) } else { row.pixels::<1>(start, limits) }
+                    },
+                );
             },
         );
         let Some(sigma_phase) = self.sigma_phase else { return };
@@ -265,8 +269,13 @@ const LANES: usize = 32;
 #[inline(always)]
 fn in_lanes(count: usize, mut work: impl FnMut(usize, bool)) {
     let whole = count / LANES * LANES;
-    (0..whole).step_by(LANES).for_each(|start| work(start, true));
-    (whole..count).for_each(|start| work(start, false));
+    // Not `for_each`, whose closure would stay behind in narrow registers.
+    for start in (0..whole).step_by(LANES) {
+        work(start, true);
+    }
+    for start in whole..count {
+        work(start, false);
+    }
 }
 
 /// What ranges and amplitudes of one frequency may be; in single precision, where comparing them comes to the same.
@@ -345,13 +354,17 @@ fn flag_unsure(given: &[Flags], confidence: &[f32], least: f64, flags: &mut [Fla
     with_wide_registers(
         #[inline(always)]
         || {
-            in_lanes(flags.len(), |start, lanes| {
-                if lanes {
-                    unsure::<LANES>(start, given, confidence, least, flags);
-                } else {
-                    unsure::<1>(start, given, confidence, least, flags);
-                }
-            });
+            in_lanes(
+                flags.len(),
+                #[inline(always)]
+                |start, lanes| {
+                    if lanes {
+                        unsure::<LANES>(start, given, confidence, least, flags);
+                    } else {
+                        unsure::<1>(start, given, confidence, least, flags);
+                    }
+                },
+            );
         },
     );
 }

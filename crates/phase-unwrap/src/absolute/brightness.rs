@@ -209,7 +209,8 @@ impl Brightness {
         let (weight, at) = (self.weight[segment], segment * self.labels..(segment + 1) * self.labels);
         let quantiles = self.quantiles[QUANTILES * at.start..QUANTILES * at.end].chunks_exact(QUANTILES);
         for (label, (quantiles, fixed)) in quantiles.zip(&self.fixed[at]).enumerate() {
-            let mean = quantiles.iter().map(|q| deviation_cost(q - log_constant, albedo)).sum::<f32>();
+            // The logarithm of a product instead of a sum of logarithms: five factors between 0.02 and 1.2.
+            let mean = -quantiles.iter().map(|q| relative_density(q - log_constant, albedo)).product::<f32>().ln();
             let nearness = NEARNESS * label as f32;
             // A wrong count bends the brightness of a slanted surface, whatever its albedo.
             let spread = (quantiles[QUANTILES - 1] - quantiles[0]).min(LARGEST_SPREAD);
@@ -242,9 +243,9 @@ fn segment_weight(n: f32) -> f32 {
     n / (n + 12.0) * (1.0 + 0.5 * (1.0 + n / 200.0).ln())
 }
 
-/// Minus the logarithm of the prior density of a log albedo `x` off its typical value, up to a constant: common surfaces,
-/// dark materials, and what obeys no albedo.
-fn deviation_cost(x: f32, albedo: &AlbedoPrior) -> f32 {
+/// Prior density of a log albedo `x` off its typical value, over the largest of common surfaces: these, dark materials, and what
+/// obeys no albedo.
+fn relative_density(x: f32, albedo: &AlbedoPrior) -> f32 {
     let common = (1.0 - DARK_SHARE - OUTLIER_SHARE) / (albedo.dark_scale + albedo.bright_scale);
     let anything = OUTLIER_SHARE / OUTLIER_SPAN;
     let density = if x < 0.0 {
@@ -252,5 +253,5 @@ fn deviation_cost(x: f32, albedo: &AlbedoPrior) -> f32 {
     } else {
         common * (-x / albedo.bright_scale).exp()
     };
-    -((density + anything) / common).ln()
+    (density + anything) / common
 }

@@ -105,12 +105,16 @@ impl Offsets {
     }
 
     fn solve(&mut self, brightness: &Brightness, log_constant: f32, options: &SpatialOptions, sweeps: usize) -> f32 {
-        // Those of the followers, most of the segments, are asked for at the best constant only.
+        self.collect_costs(brightness, log_constant, options);
+        self.labelling.solve(&self.witness_costs, sweeps)
+    }
+
+    /// Costs of the witnesses; those of the followers, most of the segments, are asked for at the best constant only.
+    fn collect_costs(&mut self, brightness: &Brightness, log_constant: f32, options: &SpatialOptions) {
         self.witness_costs.clear();
         for &segment in &self.witnesses {
             brightness.add_costs_of(segment as usize, log_constant, &options.albedo, &mut self.witness_costs);
         }
-        self.labelling.solve(&self.witness_costs, sweeps)
     }
 
     /// Constants worth a full solution, from a coarse run over all.
@@ -124,14 +128,35 @@ impl Offsets {
             return vec![(0.0, SWEEPS)];
         };
         let count = ((high - low) / SPACING).ceil() as usize + 1;
-        let coarse: Vec<(f32, f32)> = (0..count)
+        // The likeliest first: whose bound is beyond what matters needs no solution.
+        let mut bounds: Vec<(f32, f32)> = (0..count)
             .map(|index| {
                 let log_constant = low + SPACING * index as f32;
-                (log_constant, self.solve(brightness, log_constant, options, COARSE_SWEEPS))
+                (self.bound(brightness, log_constant, options), log_constant)
             })
             .collect();
-        let best = coarse.iter().fold(f32::INFINITY, |best, c| best.min(c.1));
-        coarse.iter().filter(|c| c.1 <= best + RELEVANT).map(|c| (c.0, SWEEPS)).collect()
+        bounds.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut best, mut coarse) = (f32::INFINITY, Vec::new());
+        for (bound, log_constant) in bounds {
+            if bound > best + RELEVANT {
+                break;
+            }
+            let energy = self.solve(brightness, log_constant, options, COARSE_SWEEPS);
+            best = best.min(energy);
+            coarse.push((log_constant, energy));
+        }
+        coarse.retain(|c| c.1 <= best + RELEVANT);
+        coarse.sort_by(|a, b| a.0.total_cmp(&b.0));
+        coarse.into_iter().map(|c| (c.0, SWEEPS)).collect()
+    }
+
+    /// No solution at this constant has less energy: each witness at its best label, and every tie kept.
+    fn bound(&mut self, brightness: &Brightness, log_constant: f32, options: &SpatialOptions) -> f32 {
+        self.collect_costs(brightness, log_constant, options);
+        let least = |costs: &[f32]| f64::from(costs.iter().copied().fold(f32::INFINITY, f32::min));
+        let alone: f64 = self.witness_costs.chunks_exact(brightness.labels).map(least).sum();
+        let kept: f64 = self.ties.iter().map(|tie| f64::from(tie.bonus)).sum();
+        (alone - kept) as f32
     }
 
     /// Appends the extra cost of each label of each witness over its best at this constant. Where the segment's own

@@ -130,9 +130,10 @@ impl Planes {
                 };
                 let [x, y] = [middle(col, geometry.principal_point_px[0]), middle(row, geometry.principal_point_px[1])];
                 let patch = fit(&samples, spacing as f64 / distance);
+                let likelihood = Likelihood::new(&patch);
                 for label in 0..labels {
                     let predicted = plane_curvature(x, y, patch.value + label as f64, patch.gradient);
-                    self.sums[segment * labels + label] += curvature_cost(&patch, predicted) / OVERLAP;
+                    self.sums[segment * labels + label] += likelihood.cost(predicted) / OVERLAP;
                 }
                 if patch.gradient_variance.sqrt() < 0.5 {
                     self.set_slope(grid, corner, block, patch.gradient);
@@ -182,20 +183,26 @@ fn sample(
 /// Least squares of a quadratic over the lattice, by orthogonal polynomials; `pitch` is the lattice spacing.
 fn fit(samples: &[f64; SIDE * SIDE], pitch: f64) -> Patch {
     const N: f64 = (SIDE * SIDE) as f64;
+    const MIDDLE: f64 = (SIDE as f64 - 1.0) / 2.0;
     // Second and fourth moments of the positions -(S-1)/2 .. (S-1)/2.
-    let position = |i: usize| i as f64 - (SIDE as f64 - 1.0) / 2.0;
-    let moment = |power: i32| (0..SIDE).map(|i| position(i).powi(power)).sum::<f64>() / SIDE as f64;
-    let (m2, m4) = (moment(2), moment(4));
+    const S2: f64 = (SIDE * SIDE) as f64;
+    let (m2, m4) = ((S2 - 1.0) / 12.0, (S2 - 1.0) * (3.0 * S2 - 7.0) / 240.0);
     let norms = [N, N * m2, N * m2, N * (m4 - m2 * m2), N * m2 * m2, N * (m4 - m2 * m2)];
     let mut sums = [0.0; 6];
     let mut squares = 0.0;
-    for (index, &value) in samples.iter().enumerate() {
-        let (x, y) = (position(index % SIDE), position(index / SIDE));
-        let basis = [1.0, x, y, x * x - m2, x * y, y * y - m2];
-        for (sum, basis) in sums.iter_mut().zip(basis) {
-            *sum += basis * value;
+    // Polynomials of the column are summed over each row, and these of the row over all of them.
+    for (row, values) in samples.chunks_exact(SIDE).enumerate() {
+        let (y, mut of_row) = (row as f64 - MIDDLE, [0.0; 3]);
+        for (col, value) in values.iter().enumerate() {
+            let x = col as f64 - MIDDLE;
+            of_row[0] += value;
+            of_row[1] += x * value;
+            of_row[2] += (x * x - m2) * value;
+            squares += value * value;
         }
-        squares += value * value;
+        let [plain, slope, bend] = of_row;
+        let terms = [plain, slope, y * plain, bend, y * slope, (y * y - m2) * plain];
+        sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
     }
     let explained: f64 = sums.iter().zip(norms).map(|(sum, norm)| sum * sum / norm).sum();
     let variance = ((squares - explained) / (N - 6.0)).max(1e-12);
@@ -237,16 +244,28 @@ pub(crate) fn log_cosine(x: f32, y: f32, range: f32, slope: [f32; 2]) -> f32 {
     -(range * (dx * dx + dy * dy + constant * constant).sqrt()).ln()
 }
 
-fn curvature_cost(patch: &Patch, predicted: [f64; 3]) -> f64 {
-    let mut exponent = 0.0;
-    let mut density = PLANE_SHARE * std::f64::consts::TAU.powf(-1.5);
-    for ((measured, variance), predicted) in patch.curvature.iter().zip(patch.variance).zip(predicted) {
-        let variance = variance + CURVATURE_ERROR * CURVATURE_ERROR;
-        let off = measured - predicted;
-        exponent -= 0.5 * off * off / variance;
-        density /= variance.sqrt();
+/// How likely curvatures are that are predicted for a patch; what they have in common is found once.
+struct Likelihood {
+    measured: [f64; 3],
+    variance: [f64; 3],
+    /// Density, (cycles/rad^2)^-3, of a plane's curvature where it is as predicted.
+    density: f64,
+}
+
+impl Likelihood {
+    fn new(patch: &Patch) -> Self {
+        let variance = patch.variance.map(|variance| variance + CURVATURE_ERROR * CURVATURE_ERROR);
+        let volume = std::f64::consts::TAU.powi(3) * variance.iter().product::<f64>();
+        Self { measured: patch.curvature, variance, density: PLANE_SHARE / volume.sqrt() }
     }
-    -(CURVED_DENSITY + density * exponent.exp()).ln()
+
+    /// Minus the logarithm of the density of planes and other surfaces together.
+    fn cost(&self, predicted: [f64; 3]) -> f64 {
+        let parts = self.measured.iter().zip(predicted).zip(self.variance);
+        let exponent: f64 =
+            parts.map(|((measured, predicted), variance)| (measured - predicted).powi(2) / variance).sum();
+        -(CURVED_DENSITY + self.density * (-0.5 * exponent).exp()).ln()
+    }
 }
 
 #[cfg(test)]

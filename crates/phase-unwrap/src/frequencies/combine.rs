@@ -1,6 +1,6 @@
 //! Ranges of several frequencies brought together.
 // Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+#![allow(clippy::inline_always, clippy::needless_range_loop)]
 
 use range_image::{Raster, with_wide_registers};
 
@@ -106,9 +106,11 @@ fn combine_known<const F: usize>(ranges: &[&[f32]], sigmas: &[&[f32]], out: Comb
         || {
             let (range, sigma, chi_squared) = (&mut range[..count], &mut sigma[..count], &mut chi_squared[..count]);
             for pixel in 0..count {
-                let values: [(f64, f64); F] =
-                    std::array::from_fn(|f| (f64::from(ranges[f][pixel]), f64::from(sigmas[f][pixel])));
-                [range[pixel], sigma[pixel], chi_squared[pixel]] = combine_pixel(values.into_iter());
+                let mut values = [(0.0, 0.0); F];
+                for frequency in 0..F {
+                    values[frequency] = (f64::from(ranges[frequency][pixel]), f64::from(sigmas[frequency][pixel]));
+                }
+                [range[pixel], sigma[pixel], chi_squared[pixel]] = combine_pixel(values.iter().copied());
             }
         },
     );
@@ -120,22 +122,27 @@ fn combine_known<const F: usize>(ranges: &[&[f32]], sigmas: &[&[f32]], out: Comb
 fn combine_pixel(values: impl Iterator<Item = (f64, f64)> + Clone) -> [f32; 3] {
     let (mut weight, mut weighted, mut known) = (0.0, 0.0, 0.0);
     let (mut sum, mut count) = (0.0, 0.0);
-    let is_known = |range: f64, sigma: f64| range.is_finite() & sigma.is_finite() & (sigma > 0.0);
+    // Compared with infinity, it would become a question for the class of the number, which compilers answer lane by lane.
+    let is_finite = |value: f64| value.abs() <= f64::MAX;
+    let own_weight = |range: f64, sigma: f64| {
+        let known = is_finite(range) & is_finite(sigma) & (sigma > 0.0);
+        if known { 1.0 / (sigma * sigma) } else { 0.0 }
+    };
     for (range, sigma) in values.clone() {
-        let own = if is_known(range, sigma) { 1.0 / (sigma * sigma) } else { 0.0 };
+        let own = own_weight(range, sigma);
         weight += own;
-        weighted += if is_known(range, sigma) { range * own } else { 0.0 };
-        known += if is_known(range, sigma) { 1.0 } else { 0.0 };
-        sum += if range.is_finite() { range } else { 0.0 };
-        count += if range.is_finite() { 1.0 } else { 0.0 };
+        weighted += if own > 0.0 { range * own } else { 0.0 };
+        known += if own > 0.0 { 1.0 } else { 0.0 };
+        sum += if is_finite(range) { range } else { 0.0 };
+        count += if is_finite(range) { 1.0 } else { 0.0 };
     }
     // Subnormal sigmas square to an infinite weight, which is no weight.
-    let weighs = (weight > 0.0) & weight.is_finite();
-    let mean = if weighs { weighted / weight } else { sum / count };
+    let weighs = (weight > 0.0) & is_finite(weight);
+    let mean = if weighs { weighted } else { sum } / if weighs { weight } else { count };
     let mut chi_squared = 0.0;
     for (range, sigma) in values {
-        let off = (range - mean) / sigma;
-        chi_squared += if is_known(range, sigma) { off * off } else { 0.0 };
+        let (own, off) = (own_weight(range, sigma), range - mean);
+        chi_squared += if own > 0.0 { off * off * own } else { 0.0 };
     }
     [
         mean as f32,

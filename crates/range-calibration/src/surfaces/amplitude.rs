@@ -4,29 +4,21 @@
 //! `h3 = 1/Z²`, `h2 = 1/(Z k)`, `h1 = -L h2`, and for `x = a/k`, `l = L/Z` Eq. 15 reads `Δρ = Z (√(x² + 2 l x + 1) - x)`, which is
 //! real at all amplitudes where `|l| <= 1`. The coefficients themselves leave the reals on the way.
 //!
-//! Surfaces hardly tell the level from `d0`: both together shift what is in bright light, and what the value in the dark is above the
-//! level takes the difference. What is left of the level is how sharply the curve bends, by which ranges differ by some part of a
-//! millimetre. So `D = Z - L` is estimated, and beside a `d0` that is estimated with what the level changes taken off it, which is put back
-//! in the end. A level held at zero where it is -4 mm leaves `d0` 0.3, `h3` 0.8 of their standard deviations off.
+//! The level is held, at that of the known hyperbola or at zero: surfaces do not tell it from `d0`, as both together shift what is in
+//! bright light and the value in the dark takes the difference. Estimated with it, `d0` of a room was known to 1.9 mm instead of
+//! 0.1, while what is taken off stayed the same to 0.3 mm.
 
 use error_models::AmplitudeHyperbola;
-use nalgebra::Matrix3;
+use nalgebra::Matrix3x2;
 
 use super::pixels::StationPixels;
 
 /// Names of the numbers that are estimated.
-pub(super) const NAMES: [&str; 3] =
-    ["amplitude: value in the dark over that in bright light", "amplitude: knee", "amplitude: level in bright light"];
-/// Position of the level among them.
-const LEVEL: usize = 2;
-/// The range term that the level takes the place of.
-pub(super) const OFFSET: &str = "d0";
+pub(super) const NAMES: [&str; 2] = ["amplitude: value in the dark", "amplitude: knee"];
 /// Standard deviation of the value in the dark beforehand, metre, and of the knee's logarithm: cameras err by less than a
 /// decimetre, and their knees lie within a factor of twenty of the middle amplitude. Half or twice as much moves estimates by less
 /// than their deviations, as long as the amplitudes of a scene differ by a factor of ten.
-const PRIOR_SIGMA: [f64; 2] = [0.1, 1.5];
-/// Standard deviation of the level beforehand, part of what the curve falls by: four of them are a curve that is real everywhere.
-const LEVEL_SIGMA: f64 = 0.25;
+pub(super) const PRIOR_SIGMA: [f64; 2] = [0.1, 1.5];
 /// Start of the value in the dark where no hyperbola is known, metre.
 const START_M: f64 = 0.02;
 /// Level over value in the dark beyond which the curve is none.
@@ -34,13 +26,15 @@ const LARGEST_LEVEL: f64 = 0.98;
 /// Part of the pixels that are darker and brighter than the amplitudes that the start's knee is the middle of.
 const BEYOND: f64 = 0.05;
 
-/// The hyperbola in the numbers `D` (metre), `ln k` and `L` (metre), and which of them are estimated.
+/// The hyperbola in the numbers `Z` (metre) and `ln k`, and which of them are estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct AmplitudeModel {
-    /// Values of all; estimated ones have their start here.
-    start: [f64; 3],
+    /// Values of both; estimated ones have their start here.
+    pub(super) start: [f64; 2],
     /// Positions of the estimated ones.
     pub(super) free: Vec<usize>,
+    /// Level in bright light, metre.
+    level_m: f64,
     /// Smallest and largest amplitude observed.
     span: [f64; 2],
 }
@@ -57,39 +51,16 @@ impl AmplitudeModel {
         let (dark, bright) = (at(BEYOND)?, at(1.0 - BEYOND)?);
         let span = [*amplitudes.first()?, *amplitudes.last()?];
         let known = known.filter(|known| known.h3 > 0.0 && known.h2 > 0.0);
-        let start = known.map_or([START_M, 0.5 * (dark * bright).ln(), 0.0], |known| {
-            let (in_the_dark, level) = (1.0 / known.h3.sqrt(), -known.h1 / known.h2);
-            [in_the_dark - level, (1.0 / (known.h2 * in_the_dark)).ln(), level]
+        let start = known.map_or([START_M, 0.5 * (dark * bright).ln()], |known| {
+            let in_the_dark = 1.0 / known.h3.sqrt();
+            [in_the_dark, (1.0 / (known.h2 * in_the_dark)).ln()]
         });
-        (bright > 2.0 * dark).then_some(Self { start, free: vec![0], span })
+        let level_m = known.map_or(0.0, |known| -known.h1 / known.h2);
+        (bright > 2.0 * dark).then_some(Self { start, level_m, free: vec![0], span })
     }
 
-    /// Estimates the shape as well, from a value in the dark over that in bright light; the level only beside an offset that takes what it
-    /// changes.
-    pub(super) fn shape(&mut self, in_the_dark: f64, beside_offset: bool) {
-        self.start[0] = in_the_dark;
-        self.free = if beside_offset { vec![0, 1, LEVEL] } else { vec![0, 1] };
-    }
-
-    /// Holds the level: without an offset it would change what is in bright light.
-    pub(super) fn hold_level(&mut self) {
-        self.free.retain(|position| *position != LEVEL);
-    }
-
-    /// Start and prior standard deviation of the estimated numbers.
-    pub(super) fn prior(&self) -> impl Iterator<Item = (f64, f64)> {
-        let sigma = |at: usize| PRIOR_SIGMA.get(at).copied().unwrap_or(LEVEL_SIGMA * self.start[0].abs());
-        self.free.iter().map(move |at| (self.start[*at], sigma(*at)))
-    }
-
-    /// What the level has changed, which the offset has on top, metre; and the position of the level among the estimated numbers.
-    pub(super) fn level_in_offset(&self, values: &[f64]) -> Option<(f64, usize)> {
-        let at = self.free.iter().position(|position| *position == LEVEL)?;
-        Some((values[at] - self.start[LEVEL], at))
-    }
-
-    /// All numbers, with those that are estimated.
-    fn all(&self, values: &[f64]) -> [f64; 3] {
+    /// Both numbers, with those that are estimated.
+    fn all(&self, values: &[f64]) -> [f64; 2] {
         let mut all = self.start;
         for (position, value) in self.free.iter().zip(values) {
             all[*position] = *value;
@@ -97,38 +68,33 @@ impl AmplitudeModel {
         all
     }
 
-    /// Correction (metre) at an amplitude less what the level has changed, and its derivatives by the estimated numbers, in their order.
-    pub(super) fn correction(&self, amplitude: f64, values: &[f64], derivatives: &mut [f64; 3]) -> f64 {
-        let [above, knee, level] = self.all(values);
-        let dark = above + level;
-        let (x, ratio) = (amplitude / knee.exp(), (level / dark).clamp(-LARGEST_LEVEL, LARGEST_LEVEL));
+    /// Correction (metre) at an amplitude and its derivatives by the estimated numbers, in their order.
+    pub(super) fn correction(&self, amplitude: f64, values: &[f64], derivatives: &mut [f64; 2]) -> f64 {
+        let [dark, knee] = self.all(values);
+        let (x, ratio) = (amplitude / knee.exp(), (self.level_m / dark).clamp(-LARGEST_LEVEL, LARGEST_LEVEL));
         let root = (x * x + 2.0 * ratio * x + 1.0).sqrt();
         let shape = (1.0 + 2.0 * ratio * x) / (root + x);
-        let by_dark = shape - ratio * x / root;
-        let by = [by_dark, dark * x * (1.0 - (x + ratio) / root), by_dark + x / root - 1.0];
+        let by = [shape - ratio * x / root, dark * x * (1.0 - (x + ratio) / root)];
         for (derivative, position) in derivatives.iter_mut().zip(&self.free) {
             *derivative = by[*position];
         }
-        dark * shape - (level - self.start[LEVEL])
+        dark * shape
     }
 
     /// The hyperbola with these values of the estimated numbers; `None` where its value in the dark is not above its level.
     pub(super) fn hyperbola(&self, values: &[f64]) -> Option<AmplitudeHyperbola> {
-        let [above, knee, level] = self.all(values);
-        let dark = above + level;
+        let ([dark, knee], level) = (self.all(values), self.level_m);
         let h2 = 1.0 / (dark * knee.exp());
         let hyperbola =
             AmplitudeHyperbola { h1: 0.0 - level * h2, h2, h3: 1.0 / (dark * dark), amplitude_span: self.span };
         (dark > 0.0 && level.abs() < LARGEST_LEVEL * dark).then_some(hyperbola)
     }
 
-    /// Derivatives of `h1, h2, h3` by `D, ln k, L`.
-    pub(super) fn coefficients_by_numbers(&self, values: &[f64]) -> Matrix3<f64> {
-        let [above, knee, level] = self.all(values);
-        let dark = above + level;
+    /// Derivatives of `h1, h2, h3` by `Z, ln k`.
+    pub(super) fn coefficients_by_numbers(&self, values: &[f64]) -> Matrix3x2<f64> {
+        let ([dark, knee], level) = (self.all(values), self.level_m);
         let h2 = 1.0 / (dark * knee.exp());
-        let (h1_by_dark, h3_by_dark) = (level * h2 / dark, -2.0 / dark.powi(3));
-        Matrix3::new(h1_by_dark, level * h2, h1_by_dark - h2, -h2 / dark, -h2, -h2 / dark, h3_by_dark, 0.0, h3_by_dark)
+        Matrix3x2::new(level * h2 / dark, level * h2, -h2 / dark, -h2, -2.0 / dark.powi(3), 0.0)
     }
 }
 
@@ -138,23 +104,23 @@ mod tests {
 
     use super::*;
 
-    const VALUES: [f64; 3] = [0.0838, 6.08, -0.0038];
+    const VALUES: [f64; 2] = [0.08, 6.08];
 
     fn model() -> AmplitudeModel {
-        AmplitudeModel { start: [0.0; 3], free: vec![0, 1, LEVEL], span: [1.0, 90_000.0] }
+        AmplitudeModel { start: [0.0; 2], level_m: -0.0038, free: vec![0, 1], span: [1.0, 90_000.0] }
     }
 
     #[test]
     fn it_is_the_hyperbola_of_the_range_model() {
         let hyperbola = model().hyperbola(&VALUES).unwrap();
-        let (level, _) = model().level_in_offset(&VALUES).unwrap();
         for amplitude in [3.0, 58.0, 1220.0, 25_534.0] {
-            let found = model().correction(amplitude, &VALUES, &mut [0.0; 3]) + level;
+            let found = model().correction(amplitude, &VALUES, &mut [0.0; 2]);
             assert!((found - hyperbola.correction(amplitude).unwrap()).abs() < 1e-12, "{amplitude}");
         }
         let held = AmplitudeModel { start: VALUES, free: vec![0], ..model() };
-        let found = held.correction(58.0, &VALUES[..1], &mut [0.0; 3]);
-        assert!((found - hyperbola.correction(58.0).unwrap()).abs() < 1e-15);
+        let [one, other] = [(held, &VALUES[..1]), (model(), &VALUES[..])]
+            .map(|(model, values)| model.correction(58.0, values, &mut [0.0; 2]));
+        assert!((one - other).abs() < 1e-15);
     }
 
     #[test]
@@ -165,16 +131,16 @@ mod tests {
             values
         };
         for amplitude in [3.0, 20.0, 437.0, 4000.0, 20_000.0] {
-            let mut derivatives = [0.0; 3];
+            let mut derivatives = [0.0; 2];
             let _ = model().correction(amplitude, &VALUES, &mut derivatives);
             for (k, derivative) in derivatives.iter().enumerate() {
-                let at = |by| model().correction(amplitude, &moved(k, by), &mut [0.0; 3]);
+                let at = |by| model().correction(amplitude, &moved(k, by), &mut [0.0; 2]);
                 let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
                 assert!((difference - derivative).abs() < 1e-7, "{amplitude} {k}: {difference} {derivative}");
             }
         }
         let by = model().coefficients_by_numbers(&VALUES);
-        for k in 0..3 {
+        for k in 0..2 {
             let at = |by| {
                 let found = model().hyperbola(&moved(k, by)).unwrap();
                 nalgebra::Vector3::new(found.h1, found.h2, found.h3)

@@ -6,7 +6,7 @@ use multiview_registration::{
 use nalgebra::Isometry3;
 use point_cloud::Cloud;
 
-use super::amplitude::{AmplitudeModel, OFFSET};
+use super::amplitude::{AmplitudeModel, NAMES};
 use super::options::Asked;
 use super::outcome::Estimate;
 use super::pixels::{Known, StationPixels};
@@ -181,12 +181,8 @@ fn hold(model: &mut SensorModel<'_>, open: Vec<(usize, HeldTerm)>) -> Vec<HeldTe
         model.held_range.push((parameter.column, parameter.start));
     }
     retain(&mut model.range, |index| !is_open(index));
-    let has_offset = model.has_offset();
     if let Some(amplitude) = &mut model.amplitude {
         retain(&mut amplitude.free, |index| !is_open(ranges + index));
-        if !has_offset {
-            amplitude.hold_level();
-        }
     }
     // Without its value in the dark there is no hyperbola to shape.
     if model.amplitude.as_ref().is_some_and(|amplitude| !amplitude.free.contains(&0)) {
@@ -210,20 +206,16 @@ impl SensorModel<'_> {
         self.range.is_empty() && self.amplitudes() == 0 && self.lens.is_empty()
     }
 
-    /// Whether the offset is estimated.
-    fn has_offset(&self) -> bool {
-        self.range.iter().any(|parameter| parameter.name == OFFSET)
-    }
-
     /// Goes from the start of the amplitude's part to its shape; false where it has it already, or there is none.
     fn follow_shape(&mut self, shared: &SharedParameters, held: &mut Vec<HeldTerm>) -> bool {
-        let (at, has_offset) = (self.range.len(), self.has_offset());
+        let at = self.range.len();
         let Some(amplitude) = self.amplitude.as_mut().filter(|_| !std::mem::replace(&mut self.shaped, true)) else {
             return false;
         };
         let (dark, sigma) = (shared.values[at], shared.sigma()[at]);
         if dark > SIGNIFICANT * sigma {
-            amplitude.shape(dark, has_offset);
+            amplitude.start[0] = dark;
+            amplitude.free = (0..NAMES.len()).collect();
         } else {
             let combination =
                 format!("no range error that falls with the amplitude: {dark:+.4} +- {sigma:.4} m in the dark");

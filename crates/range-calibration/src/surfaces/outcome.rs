@@ -3,7 +3,6 @@ use error_models::{AmplitudeHyperbola, NamedParameter, RangeErrorModel};
 use multiview_registration::{SharedParameters, StationRegistration};
 use nalgebra::{DMatrix, Isometry3};
 
-use super::amplitude::OFFSET;
 use super::selection::HeldTerm;
 use super::sensor_model::{CAMERA_NAMES, SensorModel, camera_values};
 use crate::{Error, Result};
@@ -45,16 +44,11 @@ impl Estimate<'_> {
                 values[position] = *value;
             }
         }
-        let (ranges, amplitudes) = (model.range.len(), model.amplitudes());
-        let of_amplitude = &shared.values[ranges..ranges + amplitudes];
-        let level = model.amplitude.as_ref().and_then(|amplitude| amplitude.level_in_offset(of_amplitude));
-        if let (Some((level_m, _)), Some(offset)) = (level, all.iter().position(|name| *name == OFFSET)) {
-            values[offset] -= level_m;
-        }
         adjusted.set_parameter_values(&values)?;
         let (names, by_shared) = named(model, &shared);
+        let (ranges, amplitudes) = (model.range.len(), model.amplitudes());
         if let Some(amplitude) = &model.amplitude {
-            let hyperbola = amplitude.hyperbola(of_amplitude);
+            let hyperbola = amplitude.hyperbola(&shared.values[ranges..ranges + amplitudes]);
             let reason = "its value in the dark would not lie above its level in bright light";
             adjusted.hyperbola = Some(hyperbola.ok_or(Error::NoHyperbola { reason })?);
         }
@@ -68,8 +62,7 @@ impl Estimate<'_> {
 fn named(model: &SensorModel<'_>, shared: &SharedParameters) -> (Vec<String>, DMatrix<f64>) {
     let (ranges, amplitudes, count) = (model.range.len(), model.amplitudes(), shared.values.len());
     let Some(amplitude) = &model.amplitude else { return (shared.names.clone(), DMatrix::identity(count, count)) };
-    let of_amplitude = &shared.values[ranges..ranges + amplitudes];
-    let by_numbers = amplitude.coefficients_by_numbers(of_amplitude);
+    let by_numbers = amplitude.coefficients_by_numbers(&shared.values[ranges..ranges + amplitudes]);
     // A coefficient that follows none of them is held: h1 at a level of zero.
     let follows = |row: &usize| amplitude.free.iter().any(|number| by_numbers[(*row, *number)] != 0.0);
     let rows: Vec<usize> = (0..3).filter(follows).collect();
@@ -78,10 +71,6 @@ fn named(model: &SensorModel<'_>, shared: &SharedParameters) -> (Vec<String>, DM
     let names = shared.names[..ranges].iter().cloned().chain(coefficients).chain(lens.iter().cloned()).collect();
     let mut by_shared = DMatrix::zeros(ranges + rows.len() + lens.len(), count);
     by_shared.view_mut((0, 0), (ranges, ranges)).fill_with_identity();
-    let offset = model.range.iter().position(|parameter| parameter.name == OFFSET);
-    if let (Some(offset), Some((_, level))) = (offset, amplitude.level_in_offset(of_amplitude)) {
-        by_shared[(offset, ranges + level)] = -1.0;
-    }
     let first_of_lens = (ranges + rows.len(), ranges + amplitudes);
     by_shared.view_mut(first_of_lens, (lens.len(), lens.len())).fill_with_identity();
     for (column, number) in amplitude.free.iter().enumerate() {

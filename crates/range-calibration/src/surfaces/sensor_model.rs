@@ -4,7 +4,7 @@ use camera_model::{Camera, InteriorOrientation, LensDistortion};
 use multiview_registration::PointModel;
 use nalgebra::Point3;
 
-use super::amplitude::{AmplitudeModel, NAMES};
+use super::amplitude::{AmplitudeModel, NAMES, PRIOR_SIGMA};
 use super::pixels::StationPixels;
 
 /// Names of the camera's parameters, in the order of [`Camera::point_derivatives`].
@@ -79,7 +79,8 @@ impl PointModel for SensorModel<'_> {
     }
 
     fn prior(&self) -> (Vec<f64>, Vec<f64>) {
-        let amplitude = self.amplitude.iter().flat_map(AmplitudeModel::prior);
+        let amplitude = self.amplitude.iter();
+        let amplitude = amplitude.flat_map(|model| model.free.iter().map(|at| (model.start[*at], PRIOR_SIGMA[*at])));
         let of = |parameter: &Parameter| (parameter.start, parameter.prior_sigma);
         let lens = self.lens.iter().map(|(_, parameter)| of(parameter));
         self.range.iter().map(of).chain(amplitude).chain(lens).unzip()
@@ -103,7 +104,7 @@ impl PointModel for SensorModel<'_> {
         for (column, value) in &self.held_range {
             range_m -= f64::from(row[*column]) * value;
         }
-        let mut by_amplitude = [0.0; 3];
+        let mut by_amplitude = [0.0; 2];
         range_m -= match &self.amplitude {
             Some(model) => model.correction(f64::from(pixels.amplitudes[index]), amplitudes, &mut by_amplitude),
             None => f64::from(pixels.by_known_hyperbola_m[index]),

@@ -155,8 +155,8 @@ impl Finish<'_> {
             let (slack_m, stride) = if first { (OFF[0] * size_m, FIRST_STRIDE) } else { (0.0, 1) };
             let gate = Gate { slack_m, stride, parameters: state.parameters.len() };
             let sums = sightings(points, &state.poses, &known, gate);
-            // Rounds from other shared planes do not undo each other.
-            let relaxation = off_m.is_none().then_some(&mut relaxation);
+            // Rounds from other shared planes do not undo each other. Of many stations one would shorten the steps of all.
+            let relaxation = (off_m.is_none() && self.network.whole).then_some(&mut relaxation);
             let adjusted = self.step(&state, known, sums, relaxation)?;
             round += 1;
             (self.progress)(round);

@@ -1,4 +1,4 @@
-//! Ray table, back-projection and depth-to-range of whole frames; one observation with its derivatives.
+//! Ray table, back-projection, what the width of pixels does, and depth-to-range of whole frames; one observation with its derivatives.
 
 #![allow(missing_docs)] // criterion's macro makes a public function
 
@@ -7,7 +7,7 @@ use std::hint::black_box;
 use camera_model::{
     Camera, ImageFormat, InteriorOrientation, LensDistortion, OrganisedCloud, RayTable, pose_from_euler,
 };
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Point3, Vector3};
 use range_image::{Flags, RangeFrame, Raster};
 
@@ -44,6 +44,14 @@ fn frames(criterion: &mut Criterion) {
         let mut cloud = OrganisedCloud::default();
         group.bench_function(BenchmarkId::new("back_project_into", &size), |b| {
             b.iter(|| table.back_project_into(black_box(&frame), &mut cloud));
+        });
+        let Ok(seen) = table.back_project(&frame) else { continue };
+        group.bench_function(BenchmarkId::new("take_off_pixel_width", &size), |b| {
+            b.iter_batched_ref(
+                || seen.clone(),
+                |cloud| table.take_off_pixel_width(black_box(cloud)),
+                BatchSize::LargeInput,
+            );
         });
         let mut plane = frame.range.clone();
         group.bench_function(BenchmarkId::new("range_to_depth_in_place", &size), |b| {

@@ -4,6 +4,7 @@ mod back_projection;
 mod camera;
 mod covariance;
 mod error;
+mod footprint;
 mod lenses;
 mod observation;
 mod pose;
@@ -18,6 +19,7 @@ pub use camera::{Camera, InteriorOrientation, LensDistortion};
 pub use covariance::{point_covariance, with_affinity_held};
 pub use error::Error;
 use error::Result;
+pub use footprint::Footprint;
 #[cfg(feature = "convert")]
 pub use lenses::plumb_bob::PlumbBob;
 #[cfg(feature = "convert")]

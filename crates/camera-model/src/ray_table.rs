@@ -98,11 +98,15 @@ impl RayTable {
 
     /// Fails unless a plane has the size of the table.
     pub(crate) fn require_size<T>(&self, plane: &Raster<T>, what: &'static str) -> Result<()> {
+        self.require(plane.width(), plane.height(), what)
+    }
+
+    /// Fails unless a size is that of the table.
+    pub(crate) fn require(&self, found_width: usize, found_height: usize, what: &'static str) -> Result<()> {
         let ImageFormat { width, height, .. } = self.format;
-        if (plane.width(), plane.height()) == (width, height) {
+        if (found_width, found_height) == (width, height) {
             return Ok(());
         }
-        let (found_width, found_height) = (plane.width(), plane.height());
         Err(range_image::Error::SizeMismatch { what, width, height, found_width, found_height }.into())
     }
 }

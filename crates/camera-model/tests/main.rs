@@ -4,6 +4,7 @@
 mod common;
 mod covariance;
 mod files;
+mod footprints;
 mod frames;
 mod jacobians;
 mod kinect2_rays;

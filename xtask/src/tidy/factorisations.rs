@@ -58,7 +58,6 @@ const KNOWN: &[(Use, &[&str])] = &[
             "orientation/src/robust_pose.rs",
             "primitives/src/linear_start.rs",
             "range-calibration/src/by_planes/planes_start.rs",
-            "range-calibration/src/surfaces/local_planes.rs",
             "rigid-pose/src/absolute_orientation/moments.rs",
             "rigid-pose/src/absolute_orientation/svd.rs",
             "scattering-deconvolution/src/estimate/search/score.rs",

@@ -142,7 +142,7 @@ stages! {
     Multipath(MultipathOptions) from Range,
     /// Frames of one station with different integration times to one frame.
     FuseExposures(FuseExposuresOptions) from Range,
-    /// Ranges to points in the camera's frame.
+    /// Ranges, less what the width of their pixels does to them, to points in the camera's frame.
     PointCloud(PointCloudOptions) from Range,
     /// Gross errors are flagged.
     Flag(FlagOptions) from Range,

@@ -50,7 +50,7 @@ fn largest_shift_px(nominal: &Camera, camera: &Camera) -> Result<f64> {
     Ok(largest)
 }
 
-/// Ranges along their rays: points in the camera's frame.
+/// Ranges along their rays, less what the width of their pixels does to them: points in the camera's frame.
 pub(super) struct PointCloud {
     pub(super) rays: Arc<RayTable>,
 }
@@ -61,7 +61,11 @@ impl ViewStage for PointCloud {
             let ViewData::Range(frame) = &view.data else {
                 return Err(Error::Needs { stage: "PointCloud", needs: "Unwrap" });
             };
-            let cloud = self.rays.back_project(frame).map_err(Error::stage("PointCloud", &view.name()))?;
+            let points = self.rays.back_project(frame).and_then(|mut cloud| {
+                self.rays.take_off_pixel_width(&mut cloud)?;
+                Ok(cloud)
+            });
+            let cloud = points.map_err(Error::stage("PointCloud", &view.name()))?;
             found.add("points", cloud.valid_count());
             view.cloud = Some(cloud);
         }

@@ -6,9 +6,7 @@
 
 mod amplitude;
 mod calibrate;
-mod footprint;
 mod holes;
-mod local_planes;
 mod options;
 mod outcome;
 mod pixels;

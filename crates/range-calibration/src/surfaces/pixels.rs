@@ -1,13 +1,12 @@
 //! The pixels of a station as the model of its points needs them.
 
-use camera_model::Camera;
+use camera_model::{Camera, OrganisedCloud, RayTable};
 use error_models::RangeErrorModel;
 use nalgebra::Vector3;
 use point_cloud::{Cloud, organised_normals};
 use range_image::Flags;
 use statistics::quantile;
 
-use super::footprint::Surfaced;
 use super::holes::filled;
 use super::{SurfaceCalibrationOptions, SurfaceCapture};
 use crate::{Error, Result};
@@ -67,7 +66,16 @@ impl StationPixels {
         // Pixels without a range are no edges: neighbours stand in for them where planes are fitted.
         let whole = filled(&points, width, height, options.normals.max_relative_jump);
         let normals = organised_normals(&whole, width, height, &options.normals).map_err(fail)?;
-        let footprints = Surfaced { camera, frame, points: &points }.footprints();
+        let seen = OrganisedCloud {
+            width,
+            height,
+            points: points.clone(),
+            sigma: frame.sigma.as_slice().to_vec(),
+            amplitude: Vec::new(),
+            flags: frame.flags.as_slice().to_vec(),
+        };
+        let footprints = RayTable::new(camera).and_then(|rays| rays.footprints(&seen, Flags::empty()));
+        let footprints = footprints.map_err(Error::from)?;
         let values = model.parameter_values();
         let [xp, yp] = camera.interior.principal_point_mm;
         let mut kept = Self { columns: known.columns.len(), ..Self::default() };

@@ -14,8 +14,9 @@ import numpy as np
 
 TOLERANCE, ANGLE, CELL, RADIUS = 0.02, np.cos(np.radians(20)), 0.08, 0.3
 LEAST, MOST_PLANES, SAMPLES, FEWEST = 60, 12, 400, 12
-# Points of a single frame: farthest off the plane of the fused points, metre; fewest for a plane; every so many centre is taken.
-FARTHEST, FEWEST_OF_FRAME, CENTRES = 0.06, 300, 45
+# Points of a single frame: farthest off the plane of the fused points, metre; fewest for a plane; places on a wall about which planes are
+# fitted. A few places more or less decide where a small wall has a relief.
+FARTHEST, FEWEST_OF_FRAME, CENTRES = 0.06, 300, 20
 
 
 def read(path):
@@ -121,7 +122,7 @@ def scatter_of_frames(part, points, frames):
     low, high = part.min(0) - RADIUS, part.max(0) + RADIUS
     inside = ((points > low) & (points < high)).all(1)
     points, frames, distances = points[inside], frames[inside], []
-    for centre in part[::CENTRES]:
+    for centre in part[:: max(1, len(part) // CENTRES)]:
         about = part[((part - centre) ** 2).sum(1) < RADIUS**2]
         if len(about) < FEWEST:
             continue

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use camera_model::{
     Camera, ImageFormat, InteriorOrientation, LensDistortion, OrganisedCloud, RayTable, pose_from_euler,
 };
-use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Point3, Vector3};
 use range_image::{Flags, RangeFrame, Raster};
 
@@ -45,13 +45,12 @@ fn frames(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::new("back_project_into", &size), |b| {
             b.iter(|| table.back_project_into(black_box(&frame), &mut cloud));
         });
-        let Ok(seen) = table.back_project(&frame) else { continue };
-        group.bench_function(BenchmarkId::new("take_off_pixel_width", &size), |b| {
-            b.iter_batched_ref(
-                || seen.clone(),
-                |cloud| table.take_off_pixel_width(black_box(cloud)),
-                BatchSize::LargeInput,
-            );
+        // Of the same size where the one before was not run.
+        if table.back_project_into(&frame, &mut cloud).is_err() {
+            continue;
+        }
+        group.bench_function(BenchmarkId::new("footprints", &size), |b| {
+            b.iter(|| table.footprints(black_box(&cloud), Flags::all()));
         });
         let mut plane = frame.range.clone();
         group.bench_function(BenchmarkId::new("range_to_depth_in_place", &size), |b| {

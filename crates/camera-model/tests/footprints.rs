@@ -126,6 +126,23 @@ fn flagged_pixels_and_holes_stay_and_tell_nothing_of_others() {
 }
 
 #[test]
+fn narrow_pixels_are_left() {
+    let wide = camera();
+    let (cloud, _) = seen(&wide, 0.0, 5);
+    // The same image behind a lens of six times the length: 2.1 mrad a pixel for 12.5.
+    let interior = InteriorOrientation { principal_distance_mm: 48.0, ..wide.interior };
+    let narrow = Camera::new(wide.format, interior, LensDistortion::default()).unwrap();
+    let moved = |camera: &Camera| {
+        let mut moved = cloud.clone();
+        RayTable::new(camera).unwrap().take_off_pixel_width(&mut moved).unwrap();
+        moved.points != cloud.points
+    };
+    assert!(moved(&wide) && !moved(&narrow));
+    let mut other = OrganisedCloud { width: 3, ..cloud };
+    assert!(RayTable::new(&narrow).unwrap().take_off_pixel_width(&mut other).is_err());
+}
+
+#[test]
 fn the_number_of_threads_changes_nothing() {
     let rays = RayTable::new(&camera()).unwrap();
     let (cloud, _) = seen(&camera(), 0.01, 6);

@@ -26,6 +26,10 @@ use local_planes::{ColumnSums, LocalPlane, LocalPlanes};
 const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
 /// Largest part of a range that a footprint changes: beyond, the surface is seen edge-on, and its normal does not tell.
 const LARGEST: f64 = 3e-3;
+/// Angle of a pixel below which its width is left in the ranges, radian: on a surface seen under 80° it does 3e-5 of the range, 0.09 mm
+/// at 3 m, and a tenth of that under 60°; noise is a hundred times as much, and a frame of 640x480 takes 65 ms of processor time. With
+/// half the angle, cameras of 640x480 are corrected as well.
+const NARROW: f64 = 2.4e-3;
 /// Standard deviation of a range of which none is stated, metre: their scale is found.
 const UNKNOWN_M: f64 = 0.01;
 
@@ -78,10 +82,14 @@ impl RayTable {
     }
 
     /// Takes what the width of pixels does to their ranges off the points of a frame: those on slanted surfaces move along their
-    /// rays. Those that carry a flag, or of whose surface too little is known, stay as they are.
+    /// rays. Those that carry a flag, or of whose surface too little is known, stay as they are; so do all of a camera whose pixels
+    /// are narrower than 2.4 mrad, where it is less than 0.1 mm at 3 m under 80°.
     ///
     /// Fails where the cloud does not fit the table.
     pub fn take_off_pixel_width(&self, cloud: &mut OrganisedCloud) -> Result<()> {
+        if self.widest_pixel() < NARROW {
+            return self.require(cloud.width, cloud.height, "cloud");
+        }
         let footprints = self.footprints(cloud, Flags::all())?;
         for (point, footprint) in cloud.points.iter_mut().zip(footprints) {
             if let Some(footprint) = footprint {
@@ -89,6 +97,14 @@ impl RayTable {
             }
         }
         Ok(())
+    }
+
+    /// Largest angle between the rays of pixels side by side, radian.
+    fn widest_pixel(&self) -> f64 {
+        let (rays, width) = (self.directions(), self.format().width);
+        let along_rows = rays.chunks_exact(width).flat_map(|row| row.iter().zip(&row[1..]));
+        let pairs = along_rows.chain(rays.iter().zip(&rays[width..]));
+        pairs.map(|(a, b)| (Vector3::from(*a) - Vector3::from(*b)).norm_squared()).fold(0.0, f64::max).sqrt()
     }
 
     /// What a pixel sees of the surface about it; `None` where it is seen edge-on.

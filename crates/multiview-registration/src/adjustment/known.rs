@@ -4,9 +4,10 @@ use nalgebra::Isometry3;
 use rigid_pose::pose_difference;
 use statistics::{CHI_MEDIANS, upper_median};
 
-/// Part of a patch from where the last rounds find their way: start poses are not taken to be better known, and what planes leave open is held by
-/// as much. Where it bounds start poses, a quarter and half of it change no digit in a building or among a Kinect's clouds.
-pub(crate) const NEAR: f64 = 0.5;
+/// Part of a patch that start poses are not taken to be better known than: from there the last rounds find their way. It guards against starts
+/// that are right for half of the stations, and must stay below what the movements of all tell otherwise: half a patch is more than the 58 mm of
+/// a building of a thousand stations, where those held so loosely met other planes and went on together by 2 mm a round.
+const BEST: f64 = 0.25;
 
 /// Standard deviations beyond which nothing is by chance: of measured turns, of where a station began (one in a million is farther off along
 /// some axis), and by which more of its points must lie on planes elsewhere, or fewer contradict, even if points come in groups of some five.
@@ -35,7 +36,7 @@ impl Known {
         (size_m, reach_m): (f64, f64),
         radius_m: f64,
     ) -> Self {
-        let [least, most] = [NEAR * size_m, reach_m].map(|length_m| Self::at(length_m, radius_m));
+        let [least, most] = [BEST * size_m, reach_m].map(|length_m| Self::at(length_m, radius_m));
         let moved = |part: usize| {
             let norm = |(a, b): (&Isometry3<f64>, &Isometry3<f64>)| pose_difference(a, b).fixed_rows::<3>(part).norm();
             upper_median(&mut start.iter().zip(now).map(norm).collect::<Vec<f64>>()) / CHI_MEDIANS[2]

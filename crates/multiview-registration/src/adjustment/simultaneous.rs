@@ -30,8 +30,11 @@ const OFF: [f64; 2] = [0.06, 0.01];
 const FIRST_STRIDE: usize = 3;
 
 /// Most rounds, each with points given to the surfaces anew; most surveys are settled after four to eight. Ranges that are 5 mm off in twice the
-/// usual noise take more than twelve.
-pub(crate) const MOST_ROUNDS: usize = 24;
+/// usual noise take more than twelve. Many stations have half as many each time that places are sought: what slides on between them does not
+/// come to rest sooner with more.
+pub(crate) const fn most_rounds(whole: bool) -> usize {
+    if whole { 24 } else { 12 }
+}
 /// Part of its standard deviation by which a station may still move.
 const FEW_SIGMAS: f64 = 0.1;
 
@@ -161,7 +164,7 @@ impl Finish<'_> {
             round += 1;
             (self.progress)(round);
             let settled = off_m.is_none() && self.settles(&state, &adjusted);
-            if settled || round >= MOST_ROUNDS {
+            if settled || round >= most_rounds(self.network.whole) {
                 let common = Common::new(state.poses.len(), &adjusted.means);
                 let factor = adjusted.factor_of_tiles();
                 return Ok(Adjusted { factor, rounds: round, settled, common, pairs_tried, ..adjusted });

@@ -6,11 +6,11 @@ use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 use statistics::upper_median;
 
-use crate::adjustment::known::{Known, NEAR};
+use crate::adjustment::known::Known;
 use crate::adjustment::network::{Network, State};
 use crate::adjustment::precision;
 use crate::adjustment::rounds::{Surfaces, WideRounds};
-use crate::adjustment::simultaneous::{Adjusted, Finish, MOST_ROUNDS};
+use crate::adjustment::simultaneous::{Adjusted, Finish, most_rounds};
 use crate::agreement::placement::{ONE_ROOM, Placements, judge_placements};
 use crate::error::Result;
 use crate::places::search::Places;
@@ -27,6 +27,8 @@ use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 const AGAIN: usize = 4;
 /// Default of the error of approximate poses, in radii of the clouds.
 const START_ERROR: f64 = 0.2;
+/// Part of a patch by which what planes leave open is held in the last rounds, which find their way from there.
+const NEAR: f64 = 0.5;
 /// The rounds end when no station moves by more than a patch over this: some hundredths of a millimetre.
 const TOLERANCE: f64 = 2000.0;
 
@@ -72,7 +74,7 @@ pub(crate) fn brought_together<'a>(
     };
     let fixed = datum.held_station();
     let network = Network { fixed, hold_m: radius_m, names, prior, turns: options.turns, whole };
-    let total = |done| progress(done, MOST_ROUNDS);
+    let total = |done| progress(done, most_rounds(whole));
     let wide_rounds = WideRounds { network: &network, reach_m, progress: &total };
     let mut modelled = Surfaces::fixed(surfaces.iter().collect());
     modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use calibration_tasks::{CalibrateMethod, CalibrateRequest};
-use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
+use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, RayTable, pose_from_euler};
 use error_models::{ModelSet, RangeErrorModel, RangeTerms};
 use nalgebra::Vector3;
 use pipeline::{Plan, Silent, ViewData, process};
-use range_image::Modulation;
+use range_image::{Flags, Modulation, RangeFrame, Raster};
 use range_io::calibration::Calibration;
 use range_io::npz::NpzWriter;
 use range_io::tables::{ObservedPlane, Station, write_planes, write_stations};
@@ -222,13 +222,26 @@ fn a_calibrated_lens_and_range_go_together() {
     let calibration = Calibration::read(&out).unwrap();
     let model = &calibration.model_set().unwrap().entries[0].1[0];
     let camera = calibration.camera().unwrap();
-    let pixel = [130.0, 20.0];
-    let [x, y] = camera.format.image_from_pixel(pixel);
     let [xp, yp] = camera.interior.principal_point_mm;
-    let expected = camera.point(pixel, model.corrected_range(2.5, x - xp, y - yp, f64::NAN));
-    let found = outcome.views[0].cloud.as_ref().unwrap().points[20 * 176 + 130];
+    let corrected = |col: usize, row: usize| {
+        let [x, y] = camera.format.image_from_pixel([col as f64, row as f64]);
+        model.corrected_range(2.5, x - xp, y - yp, f64::NAN) as f32
+    };
+    let plane = |value: f32| Raster::filled(176, 144, value);
+    let frame = RangeFrame {
+        range: Raster::from_fn(176, 144, corrected),
+        sigma: plane(f32::NAN),
+        amplitude: plane(f32::NAN),
+        flags: Raster::filled(176, 144, Flags::empty()),
+    };
+    let rays = RayTable::new(&camera).unwrap();
+    let mut expected = rays.back_project(&frame).unwrap();
+    rays.take_off_pixel_width(&mut expected).unwrap();
+    let found = &outcome.views[0].cloud.as_ref().unwrap().points;
+    let at = 20 * 176 + 130;
     // Ranges are kept in single precision: 2.5 m to 0.2 micrometre.
-    assert!((expected.coords - Vector3::from(found)).norm() < 1e-6, "{expected} and {found:?}");
+    let [expected, found] = [expected.points[at], found[at]].map(Vector3::from);
+    assert!((expected - found).norm() < 1e-6, "{expected} and {found}");
     // Frames of another integration time are refused by name.
     calibration_setup::edit(&survey.join("survey.ron"), "0.004", "0.001");
     let message = process(&plan, &survey, Some(&out), &Silent).unwrap_err().to_string();

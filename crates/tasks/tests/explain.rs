@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use nalgebra::Vector3;
 use pipeline::{Plan, Silent, SimulateSource, ViewData, process, simulate};
 use range_image::Flags;
 use range_io::npz::NpzWriter;
@@ -62,9 +63,15 @@ fn parts_add_up_and_agree_with_the_run_and_every_flag_has_a_reason() {
     let outcome = process(&stages, &survey, None, &Silent).unwrap();
     let view = &outcome.views[0];
     let ViewData::Range(frame) = &view.data else { unreachable!("ranges at the end") };
-    // The middle, a corner, and for each flag the first pixel that carries it.
-    let mut pixels = vec![[66, 54], [0, 0]];
+    let cloud = view.cloud.as_ref().unwrap();
+    let ranges: Vec<f64> = cloud.points.iter().map(|point| Vector3::from(*point).norm()).collect();
+    // The middle, a corner, the pixel whose width does most, and for each flag the first pixel that carries it.
     let width = frame.width();
+    let by_width = |index: &usize| (ranges[*index] - f64::from(frame.range.as_slice()[*index])).abs();
+    let known = (0..ranges.len()).filter(|index| by_width(index).is_finite());
+    let widest = known.max_by(|a, b| by_width(a).total_cmp(&by_width(b))).unwrap();
+    assert!(by_width(&widest) > 1e-3);
+    let mut pixels = vec![[66, 54], [0, 0], [widest % width, widest / width]];
     for (flag, _) in Flags::NAMED {
         let place = frame.flags.as_slice().iter().position(|flags| flags.contains(flag));
         pixels.extend(place.map(|index| [index % width, index / width]));
@@ -72,7 +79,7 @@ fn parts_add_up_and_agree_with_the_run_and_every_flag_has_a_reason() {
     let (mut groups, mut flags) = (BTreeSet::new(), BTreeSet::new());
     for [col, row] in pixels {
         let found = explain(&request(&survey, "0", [col, row]), &Silent).unwrap();
-        let range = frame.range[(col, row)];
+        let range = ranges[row * width + col] as f32;
         assert_eq!(found.range_m.map(|range| range as f32), Some(range).filter(|range| range.is_finite()));
         let named: Flags = Flags::NAMED
             .into_iter()
@@ -89,6 +96,8 @@ fn parts_add_up_and_agree_with_the_run_and_every_flag_has_a_reason() {
             let point = found.point_m.unwrap();
             let length = point.iter().map(|x| x * x).sum::<f64>().sqrt();
             assert!((length - range_m).abs() < 1e-9);
+            let in_cloud = Vector3::from(cloud.points[row * width + col]);
+            assert!((Vector3::from(point) - in_cloud).norm() < 1e-6, "{point:?} {in_cloud}");
         }
         groups.extend(found.stages.iter().flat_map(|line| &line.parts).map(|part| part.group));
         assert!(found.stages.iter().all(|line| line.stage != "Register"), "stations stay where they are");
@@ -97,7 +106,7 @@ fn parts_add_up_and_agree_with_the_run_and_every_flag_has_a_reason() {
         }
     }
     println!("groups {groups:?}, flags {flags:?}");
-    for group in ["averaging", "scattering", "offset", "periodic", "position", "amplitude"] {
+    for group in ["averaging", "scattering", "offset", "periodic", "position", "amplitude", "pixel width"] {
         assert!(groups.contains(group), "{group} in {groups:?}");
     }
     assert!(flags.len() >= 3, "{flags:?}");
@@ -188,18 +197,22 @@ fn what_is_wrong_is_named() {
         let request = ExplainRequest { plan: Some(plan), ..request(folder.path(), frame, pixel) };
         explain(&request, &Silent)
     };
-    assert!(ask("b.npz", [3, 2]).unwrap().flags.is_empty());
+    let found = ask("b.npz", [3, 2]).unwrap();
+    assert!(found.flags.is_empty());
+    assert_eq!((found.range_m, found.moved_m), (Some(1.5), 0.0));
+    assert!(found.to_string().contains("moved +0.0 mm: no stage changed it"), "{found}");
     let message = ask("7", [0, 0]).unwrap_err().to_string();
     assert!(message.contains("no frame `7`; the survey has 0: a.npz (S0), 1: b.npz (S1)"), "{message}");
     let message = ask("0", [4, 0]).unwrap_err().to_string();
     assert!(message.contains("pixel 4,0 is outside the image: columns run from 0 to 3, rows from 0 to 2"), "{message}");
     let ruled_out = explain(&request(folder.path(), "0", [0, 0]), &Silent).unwrap_err().to_string();
     assert!(ruled_out.contains("stage Demodulate is ruled out"), "{ruled_out}");
-    // Without a pipeline the level chooses.
+    // Without a pipeline the level chooses. The ranges are those of a ball about the camera, of which pixels see three micrometres.
     let free = ExplainRequest { plan: None, ..request(folder.path(), "0", [0, 0]) };
     let found = explain(&free, &Silent).unwrap();
-    assert_eq!((found.range_m, found.moved_m), (Some(1.5), 0.0));
-    assert!(found.to_string().contains("moved +0.0 mm: no stage changed it"), "{found}");
+    let names: Vec<&str> = found.stages.iter().map(|line| line.stage).collect();
+    assert_eq!(names, ["Average", "Multipath", "FuseExposures", "PointCloud", "Flag"]);
+    assert!((-5e-6..0.0).contains(&found.moved_m) && (found.range_m.unwrap() - 1.5).abs() < 5e-6, "{found}");
 }
 
 #[test]

@@ -7,6 +7,7 @@ pub(crate) mod parts;
 use std::path::PathBuf;
 
 use camera_model::RayTable;
+use nalgebra::Vector3;
 use range_image::Flags;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
@@ -305,7 +306,10 @@ fn state_of(view: &View, [col, row]: [usize; 2]) -> PixelState {
             let radians = view.modulation.map(|modulation| modulation.phase_from_range(1.0));
             let parts = first.zip(amplitude).zip(radians);
             let amplitude_sigma = parts.map(|((sigma, amplitude), per_metre)| sigma * amplitude * per_metre);
-            PixelState { range_m: known(frame.range[at]), sigma_m, amplitude, amplitude_sigma, flags }
+            // The point stands where the pixel's width has been taken off, in single precision where it has not moved.
+            let point = view.cloud.as_ref().map(|cloud| Vector3::from(cloud.points[row * cloud.width + col]));
+            let range_m = known(point.map_or(frame.range[at], |point| point.norm() as f32));
+            PixelState { range_m, sigma_m, amplitude, amplitude_sigma, flags }
         }
     }
 }

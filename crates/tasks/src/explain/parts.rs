@@ -21,12 +21,10 @@ pub(super) fn parts(stage: &Stage, before: &View, after: &View, pixel: [usize; 2
         Stage::CorrectRange(_) => return corrected(after, pixel),
         Stage::Multipath(_) => one("range of the direct path".to_owned(), "multipath"),
         Stage::FuseExposures(_) => one("weighted mean of the exposures that agree".to_owned(), "fusion"),
-        Stage::Demodulate(_)
-        | Stage::CorrectImagePoint(_)
-        | Stage::PointCloud(_)
-        | Stage::Flag(_)
-        | Stage::Register(_)
-        | Stage::Adjust(_) => one("changed".to_owned(), "others"),
+        Stage::PointCloud(_) => one("width of the pixel on its surface".to_owned(), "pixel width"),
+        Stage::Demodulate(_) | Stage::CorrectImagePoint(_) | Stage::Flag(_) | Stage::Register(_) | Stage::Adjust(_) => {
+            one("changed".to_owned(), "others")
+        }
     };
     all.into_iter().filter(|part| part.change_m != 0.0).collect()
 }

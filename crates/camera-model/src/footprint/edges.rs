@@ -14,6 +14,7 @@ const BESIDE: f64 = 4.0;
 const LEAST_SCALE: f64 = 0.1;
 /// Pixels from which the scale of noise is found: it is known to a third of a percent then.
 const SAMPLE: usize = 32_768;
+
 /// Tells which pixels of a frame lie at edges.
 pub(super) struct Edges<'a> {
     seen: &'a [Seen],
@@ -26,7 +27,7 @@ impl<'a> Edges<'a> {
     pub(super) fn new(seen: &'a [Seen], cloud: &'a OrganisedCloud) -> Self {
         let has_mixed = cloud.flags.iter().any(|flags| flags.contains(Flags::MIXED_PIXEL));
         let unscaled = Self { seen, cloud, has_mixed, scale: 1.0 };
-        // Odd, so that all columns take part.
+        // Odd: images are an even number of columns wide, and a step that divides it would see a few of them only.
         let sample = (0..seen.len()).step_by((seen.len() / SAMPLE) | 1);
         let beside = sample.flat_map(|index| unscaled.beside(index % cloud.width, index / cloud.width));
         let mut known: Vec<f64> = beside.flatten().map(f64::sqrt).collect();

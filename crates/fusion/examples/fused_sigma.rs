@@ -16,6 +16,7 @@ use fusion::{CommonErrorUse, Fused, FusionOptions, Reason, fuse};
 struct Counts {
     points: usize,
     contradictions: usize,
+    outvoted: usize,
     apart: usize,
     /// Surfels of which frames are said to disagree.
     disagree: usize,
@@ -27,6 +28,7 @@ impl Counts {
     fn add(&mut self, fused: &Fused, seconds: f64) {
         self.points += fused.surfel_of_point.len();
         self.contradictions += fused.contradictions.len();
+        self.outvoted += fused.outvoted;
         self.apart += fused.apart.len();
         self.disagree += fused.surfels.iter().filter(|surfel| surfel.variance_factor > 1.0).count();
         self.seconds += seconds;
@@ -73,8 +75,8 @@ fn print(judged: &Judgement, counts: &Counts) {
         counts.points, judged.surfels, judged.ghosts, counts.seconds
     );
     println!(
-        "contradictions of surfels {}, stations apart {}, surfels of which frames disagree {}",
-        counts.contradictions, counts.apart, counts.disagree
+        "contradictions of surfels {}, surfels given up for them {}, stations apart {}, surfels of which frames disagree {}",
+        counts.contradictions, counts.outvoted, counts.apart, counts.disagree
     );
     println!("points contradict {contradict:.3} %, between {between:.2} %, at edges {edge:.2} %, alone {alone:.2} %");
     println!("{:<14} {:>9} {:>16}", "class", "surfels", "error²/variance");

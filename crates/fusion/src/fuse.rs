@@ -10,8 +10,8 @@ use crate::input::{Observation, Observations, Registered};
 use crate::options::{CommonErrorUse, FusionOptions};
 use crate::outcome::{Fused, Surfel};
 use crate::patches::{patches, seeds};
-use crate::sight::{Scene, contradictions, reasons};
-use crate::surfels::{Bend, Estimate, FARTHEST, Gathered, Owner, bends, gather, give_up_uneven, nonempty};
+use crate::sight::{self, Scene};
+use crate::surfels::{Bend, Estimate, FARTHEST, Gathered, Owner, bends, gather, give_up, is_even, nonempty};
 use crate::{Error, Result};
 
 /// Points that common errors are estimated from, about, in two passes: the second from points that the first has moved to within what
@@ -109,47 +109,76 @@ impl Task<'_> {
         nonempty(&gathered, observations)?;
         split(&mut gathered, observations, errors, common, options.level)?;
         let mut bends = bends(&gathered.seeds, &gathered.estimates, options.voxel_m);
-        give_up_uneven(&mut gathered, &mut bends, options);
-        nonempty(&gathered, observations)?;
+        let is_even = is_even(&gathered, &bends, options);
+        give_up(&mut gathered, &mut bends, &is_even, Owner::Uneven);
+        let (mut contradictions, mut outvoted) = (Vec::new(), 0);
+        loop {
+            nonempty(&gathered, observations)?;
+            let (rows, surfels) = self.surfels(&gathered, &bends, observations, common)?;
+            let scene = Scene::new(&surfels, input.centres);
+            let pairs = sight::contradictions(&scene, options);
+            let stays = sight::stay(&surfels, &pairs);
+            let staying = stays.iter().filter(|stays| **stays).count();
+            if staying < surfels.len() {
+                let gone = pairs.iter().filter(|pair| !(stays[pair.front as usize] && stays[pair.behind as usize]));
+                contradictions.extend(gone.map(|pair| pair.found));
+                outvoted += surfels.len() - staying;
+                give_up(&mut gathered, &mut bends, &stays, Owner::Outvoted);
+                continue;
+            }
+            contradictions.extend(pairs.iter().map(|pair| pair.found));
+            let mut fronts: Vec<u32> = pairs.iter().map(|pair| pair.front).collect();
+            fronts.sort_unstable();
+            fronts.dedup();
+            let unfused = sight::reasons(&scene, observations, &gathered.owners, gate);
+            return Ok(Fused {
+                surfel_of_point: surfels_of_points(&gathered, observations),
+                strongest: gathered.estimates.iter().map(|place| place.strongest).collect(),
+                surfels,
+                unfused,
+                contradictions,
+                outvoted,
+                seen_through: fronts.len(),
+                apart: found.apart,
+                shared_error: found.shared,
+                corrections: found.posterior.values.iter().copied().collect(),
+                common: common.clone(),
+                rows,
+            });
+        }
+    }
+
+    /// The surfels of places, with the derivatives of their heights by common errors.
+    fn surfels(
+        &self,
+        gathered: &Gathered,
+        bends: &[Bend],
+        observations: &Observations,
+        common: &CommonErrors,
+    ) -> Result<(Vec<Row>, Vec<Surfel>)> {
         let (rows, squares): (Vec<Row>, Vec<Squares>) = gathered
             .estimates
             .par_iter()
             .with_min_len(64)
             .map(|place| {
-                let rows = common::rows(place, &observations.all, errors, common)?;
+                let rows = common::rows(place, &observations.all, self.errors, common)?;
                 Ok((common::mean(place, &rows), Squares::new(place, &rows, common)))
             })
             .collect::<Result<Vec<_>>>()?
             .into_iter()
             .unzip();
-        let factors = variance_factors(&gathered, &squares);
-        let surfels: Vec<Surfel> = (0..rows.len())
+        let factors = variance_factors(gathered, &squares);
+        let surfels = (0..rows.len())
             .into_par_iter()
             .with_min_len(64)
             .map(|at| {
                 let place = &gathered.estimates[at];
-                let amplitude = amplitude(input, &gathered.members[at], observations);
+                let amplitude = amplitude(self.input, &gathered.members[at], observations);
                 let shares = shares(place, &rows[at], common);
-                surfel(place, options.voxel_m, bends[at], shares, factors[at], amplitude)
+                surfel(place, self.options.voxel_m, bends[at], shares, factors[at], amplitude)
             })
             .collect();
-        let scene = Scene::new(&surfels, input.centres);
-        let contradictions = contradictions(&scene, options);
-        let unfused = reasons(&scene, observations, &gathered.owners, gate);
-        let strongest = gathered.estimates.iter().map(|place| place.strongest).collect();
-        let surfel_of_point = surfels_of_points(&gathered, observations);
-        Ok(Fused {
-            surfels,
-            unfused,
-            surfel_of_point,
-            contradictions,
-            apart: found.apart,
-            shared_error: found.shared,
-            corrections: found.posterior.values.iter().copied().collect(),
-            common: common.clone(),
-            rows,
-            strongest,
-        })
+        Ok((rows, surfels))
     }
 }
 

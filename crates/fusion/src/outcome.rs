@@ -69,6 +69,8 @@ pub enum Reason {
         /// Distance along the surfel's normal over its standard deviation.
         deviations: f64,
     },
+    /// Contradicts: its surface cannot be there beside what more frames saw.
+    Outvoted,
     /// Mixed: between two surfaces that its frame saw side by side.
     Between {
         /// The nearer surfel.
@@ -87,7 +89,7 @@ pub enum Reason {
 impl Reason {
     /// Whether the point contradicts others.
     pub fn is_contradiction(&self) -> bool {
-        matches!(self, Self::SeenThrough { .. } | Self::Behind { .. } | Self::OffSurface { .. })
+        matches!(self, Self::SeenThrough { .. } | Self::Behind { .. } | Self::OffSurface { .. } | Self::Outvoted)
     }
 }
 
@@ -103,12 +105,12 @@ pub struct Unfused {
 /// Two surfels of which one hides the other from a frame that saw it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contradiction {
-    /// The surfel in front, which was not seen by `seen_through_by`.
-    pub front: u32,
+    /// Where the surfel in front is, which was not seen by `seen_through_by`.
+    pub front: Point3<f64>,
     /// A frame that saw the front.
     pub front_frame: u32,
-    /// The surfel behind.
-    pub behind: u32,
+    /// Where the surfel behind is.
+    pub behind: Point3<f64>,
     /// The frame that saw the one behind, through the one in front.
     pub seen_through_by: u32,
     /// Distance along the normal of the one in front, metre.
@@ -153,8 +155,12 @@ pub struct Fused {
     pub unfused: Vec<Unfused>,
     /// The surfel of each point.
     pub surfel_of_point: Vec<Option<u32>>,
-    /// Surfels that cannot both be there.
+    /// Surfels that could not both be there. Where more frames spoke against one than for it, it was given up and is none of `surfels`.
     pub contradictions: Vec<Contradiction>,
+    /// How many surfels were given up so; the reason of their points is [`Reason::Outvoted`].
+    pub outvoted: usize,
+    /// How many of `surfels` a frame has seen through.
+    pub seen_through: usize,
     /// Stations that do not fit the others.
     pub apart: Vec<Apart>,
     /// What was found of the common errors, in their units, and has been taken off the points. Zeros where they were not estimated.

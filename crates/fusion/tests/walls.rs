@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use fusion::{FusionOptions, Reason, fuse};
+use fusion::{Fused, FusionOptions, Reason, fuse};
 
 use crate::common::scene::THIN;
 use crate::common::survey::{Plan, Survey};
@@ -43,7 +43,7 @@ fn walls_that_differ_by_what_is_stated_become_one() {
 }
 
 #[test]
-fn a_station_beyond_what_is_stated_is_named_and_its_wall_stays() {
+fn a_station_beyond_what_is_stated_is_named_and_its_wall_stays_apart() {
     // Six deviations of the station, four of the difference of two.
     let mut wall = Wall::new(4, 60, 0.003, 0.0, 0.002, 4);
     for (point, _) in wall.points.iter_mut().zip(&wall.frames).filter(|(_, frame)| **frame == 2) {
@@ -54,22 +54,54 @@ fn a_station_beyond_what_is_stated_is_named_and_its_wall_stays() {
     assert_eq!(fused.apart[0].frames, [2]);
     assert_eq!(fused.apart[0].others, [0, 1, 3]);
     assert!(fused.apart[0].shifts[0].0 == "S2 dz" && fused.apart[0].shifts[0].1 > 0.006);
-    let (upper, lower): (Vec<_>, Vec<_>) = fused.surfels.iter().partition(|s| s.frames == [2]);
-    assert!(upper.len() > 350 && lower.len() > 350, "{} {}", upper.len(), lower.len());
-    assert!(upper.iter().all(|s| s.position.z > 0.004) && lower.iter().all(|s| s.position.z < 0.004));
+    // Four deviations are too few to tell at each place that three saw through it: some of its wall stays.
+    let (own, theirs): (Vec<_>, Vec<_>) = fused.surfels.iter().partition(|s| s.frames == [2]);
+    assert!(theirs.len() > 350 && theirs.iter().all(|s| s.position.z < 0.004), "{}", theirs.len());
+    assert!(own.len() + fused.outvoted > 350 && own.iter().all(|s| s.position.z > 0.004), "{}", own.len());
+    let outvoted = fused.unfused.iter().filter(|unfused| unfused.reason == Reason::Outvoted);
+    assert!(outvoted.map(|unfused| wall.frames[unfused.point]).all(|frame| frame == 2));
+}
+
+/// A wall of stations that each see it once, with those of some of them moved along its normal.
+fn moved(stations: usize, by_m: f64, which: fn(u32) -> bool) -> (Wall, Fused) {
+    let mut wall = Wall::new(stations, 60, 0.003, 0.0, 0.002, 4);
+    for (point, _) in wall.points.iter_mut().zip(&wall.frames).filter(|(_, frame)| which(**frame)) {
+        point.z += by_m;
+    }
+    let fused = fuse(&wall.registered(), &wall, &wall.common, &FusionOptions::default()).unwrap();
+    (wall, fused)
+}
+
+#[test]
+fn of_as_many_for_as_against_both_stay() {
+    let (_, fused) = moved(4, 0.12, |frame| frame < 2);
+    let front = fused.surfels.iter().filter(|s| s.frames == [0, 1]).count();
+    assert!(front > 330 && fused.seen_through > 300, "{front} {}", fused.seen_through);
+    // At the walls' edges one frame alone sees past the other's.
+    assert!(fused.outvoted < 60, "{}", fused.outvoted);
+}
+
+#[test]
+fn what_one_saw_through_a_wall_of_many_is_outvoted() {
+    let (wall, fused) = moved(4, -0.12, |frame| frame == 1);
+    let behind = fused.surfels.iter().filter(|s| s.frames == [1]).count();
+    // At its edges, 76 of 400, the one sees past the walls of the others.
+    assert!(fused.outvoted > 290 && behind < 110, "{} {behind}", fused.outvoted);
+    let outvoted = fused.unfused.iter().filter(|unfused| unfused.reason == Reason::Outvoted);
+    assert!(outvoted.map(|unfused| wall.frames[unfused.point]).all(|frame| frame == 1));
 }
 
 #[test]
 fn a_wall_far_beyond_what_is_stated_is_seen_through() {
-    let mut wall = Wall::new(3, 60, 0.003, 0.0, 0.002, 4);
-    for (point, _) in wall.points.iter_mut().zip(&wall.frames).filter(|(_, frame)| **frame == 1) {
-        point.z += 0.12;
-    }
-    let fused = fuse(&wall.registered(), &wall, &wall.common, &FusionOptions::default()).unwrap();
+    let (_, fused) = moved(3, 0.12, |frame| frame == 1);
+    // What is left of it stands at its edges, where nothing was seen behind.
+    let left = fused.surfels.iter().filter(|s| s.frames == [1]).count();
+    assert!(fused.outvoted > 330 && left < 60, "{} {left}", fused.outvoted);
     let pairs: BTreeSet<(u32, u32)> = fused.contradictions.iter().map(|c| (c.front_frame, c.seen_through_by)).collect();
     assert_eq!(pairs, BTreeSet::from([(1, 0), (1, 2)]));
     let seen = &fused.contradictions[fused.contradictions.len() / 2];
     assert!((seen.distance_m - 0.12).abs() < 0.02 && seen.deviations > 10.0, "{seen:?}");
+    assert!(seen.front.z > 0.1 && seen.behind.z < 0.02, "{seen:?}");
 }
 
 #[test]

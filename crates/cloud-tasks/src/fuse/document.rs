@@ -14,10 +14,11 @@ impl fmt::Display for FuseSummary {
 }
 
 /// Reasons as `summary.json` has them, in words.
-const REASONS: [(&str, &str); 7] = [
+const REASONS: [(&str, &str); 8] = [
     ("seen_through", "another frame saw a surface behind it, through it"),
     ("behind", "it lies behind a surface that other frames saw"),
     ("off_surface", "it lies off the surface that its own frame saw around it"),
+    ("outvoted", "its surface cannot be there beside what more frames saw"),
     ("between", "mixed: between two surfaces that its frame saw side by side"),
     ("at_edge", "beside an edge: it may belong to either surface"),
     ("uneven", "its neighbours lie on no plane"),

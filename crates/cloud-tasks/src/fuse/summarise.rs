@@ -1,6 +1,6 @@
 //! Figures of a fused cloud, and what speaks against it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use commands::{Doubt, DoubtKind};
@@ -55,7 +55,8 @@ pub(crate) fn finish(
         *summary.unfused.entry(reason_name(&unfused.reason)).or_default() += 1;
     }
     summary.contradictions = contradictions(&fused.contradictions, views);
-    summary.contradicted_points = fused.contradictions.iter().map(|found| found.front).collect::<BTreeSet<_>>().len();
+    summary.contradicted_points = fused.seen_through + fused.outvoted;
+    summary.outvoted_points = fused.outvoted;
     let names = |frames: &[u32]| frames.iter().map(|frame| view(views, *frame)).collect();
     let apart = fused.apart.iter().map(|apart| ApartSummary {
         frames: names(&apart.frames),
@@ -79,6 +80,7 @@ fn reason_name(reason: &Reason) -> &'static str {
         Reason::SeenThrough { .. } => "seen_through",
         Reason::Behind { .. } => "behind",
         Reason::OffSurface { .. } => "off_surface",
+        Reason::Outvoted => "outvoted",
         Reason::Between { .. } => "between",
         Reason::AtEdge => "at_edge",
         Reason::Uneven => "uneven",
@@ -231,7 +233,8 @@ fn doubts(summary: &mut FuseSummary) {
         );
         summary.doubts.push(Doubt::about(DoubtKind::Contradiction, apart.frames.join(", "), words));
     }
-    let share = summary.contradicted_points as f64 / summary.fused_points.max(1) as f64;
+    let all = summary.fused_points + summary.outvoted_points;
+    let share = summary.contradicted_points as f64 / all.max(1) as f64;
     if share > MANY_CONTRADICTIONS {
         let worst = summary.contradictions.iter().max_by_key(|found| found.pairs);
         let worst = worst.map_or_else(String::new, |worst| {
@@ -242,12 +245,13 @@ fn doubts(summary: &mut FuseSummary) {
             )
         });
         let words = format!(
-            "frames saw through {} of {} fused points ({:.1} %; up to {:.0} % is what one who walks by hides){worst}: something moved, or \
-             a pose is wrong by more than stated",
+            "{} of {all} fused points cannot be there beside what other frames saw ({:.1} %; up to {:.0} % is what one who walks by \
+             hides), of which {} were given up, for more frames spoke against them than for them{worst}: something moved, or a pose is wrong \
+             by more than stated",
             summary.contradicted_points,
-            summary.fused_points,
             100.0 * share,
-            100.0 * MANY_CONTRADICTIONS
+            100.0 * MANY_CONTRADICTIONS,
+            summary.outvoted_points
         );
         summary.doubts.push(Doubt::new(DoubtKind::Contradiction, words));
     }

@@ -23,10 +23,13 @@ pub struct FuseSummary {
     pub points: CountedPoints,
     /// Fused points.
     pub fused_points: usize,
-    /// Points that are in none, by reason: `seen_through`, `behind`, `off_surface`, `between`, `at_edge`, `uneven`, `alone`.
+    /// Points that are in none, by reason: `seen_through`, `behind`, `off_surface`, `outvoted`, `between`, `at_edge`, `uneven`,
+    /// `alone`.
     pub unfused: BTreeMap<&'static str, usize>,
-    /// Fused points that a frame saw through.
+    /// Fused points that a frame saw through, with those that were given up for it.
     pub contradicted_points: usize,
+    /// Of these the ones that were given up, since more frames spoke against them than for them.
+    pub outvoted_points: usize,
     /// Surfaces that cannot both be there, by pair of frames.
     pub contradictions: Vec<ContradictionSummary>,
     /// Stations that do not fit the others.

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::outcome::Surfel;
-pub(crate) use contradict::contradictions;
+pub(crate) use contradict::{contradictions, stay};
 use map::Map;
 pub(crate) use reason::reasons;
 

@@ -19,6 +19,7 @@ pub(crate) fn reasons(scene: &Scene<'_>, observations: &Observations, owners: &[
                 Owner::Place(_) => return None,
                 Owner::Either(..) => Reason::AtEdge,
                 Owner::Uneven => Reason::Uneven,
+                Owner::Outvoted => Reason::Outvoted,
                 Owner::Nobody => reason(scene, point, gate),
             };
             Some(Unfused { point: point.index as usize, reason })

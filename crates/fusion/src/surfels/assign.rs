@@ -29,6 +29,8 @@ pub(crate) enum Owner {
     Place(u32),
     /// To a place whose points lie on no plane.
     Uneven,
+    /// To a place that cannot be there beside what more frames saw.
+    Outvoted,
     /// To one of two surfaces that meet there, by the numbers of the places that were chosen from.
     Either(u32, u32),
 }

@@ -95,7 +95,7 @@ fn last(observations: &Observations, patches: &Patches, seeds: &[(u64, Seed)], l
 /// An owner by the new numbers; a surface that was given up owns nothing.
 fn renumbered(owner: Owner, number: &[u32]) -> Owner {
     match owner {
-        Owner::Nobody | Owner::Uneven | Owner::Either(..) => owner,
+        Owner::Nobody | Owner::Uneven | Owner::Outvoted | Owner::Either(..) => owner,
         Owner::Place(place) => match number[place as usize] {
             u32::MAX => Owner::Nobody,
             place => Owner::Place(place),
@@ -103,16 +103,20 @@ fn renumbered(owner: Owner, number: &[u32]) -> Owner {
     }
 }
 
-/// Gives up places whose points lie on no plane.
-pub(crate) fn give_up_uneven(gathered: &mut Gathered, around: &mut Vec<Bend>, options: &FusionOptions) {
+/// Which places have their points on a plane.
+pub(crate) fn is_even(gathered: &Gathered, around: &[Bend], options: &FusionOptions) -> Vec<bool> {
     let deviations = Distribution::Normal.upper_quantile(options.outlier_level);
     let goes_on = Distribution::Normal.critical(CONTINUES);
     let is_plane =
         |(place, bend): (&Estimate, &Bend)| place.is_plane(deviations, options.voxel_m) && bend.off.abs() <= goes_on;
-    let is_plane: Vec<bool> = gathered.estimates.iter().zip(around.iter()).map(is_plane).collect();
-    let mut number = vec![u32::MAX; is_plane.len()];
+    gathered.estimates.iter().zip(around).map(is_plane).collect()
+}
+
+/// Gives up places but those that are kept; their points are of this owner.
+pub(crate) fn give_up(gathered: &mut Gathered, around: &mut Vec<Bend>, is_kept: &[bool], instead: Owner) {
+    let mut number = vec![u32::MAX; is_kept.len()];
     let mut count = 0;
-    for (at, number) in number.iter_mut().enumerate().filter(|(at, _)| is_plane[*at]) {
+    for (at, number) in number.iter_mut().enumerate().filter(|(at, _)| is_kept[*at]) {
         *number = count;
         gathered.seeds.swap(count as usize, at);
         gathered.estimates.swap(count as usize, at);
@@ -126,7 +130,7 @@ pub(crate) fn give_up_uneven(gathered: &mut Gathered, around: &mut Vec<Bend>, op
     around.truncate(count as usize);
     for owner in &mut gathered.owners {
         *owner = match *owner {
-            Owner::Place(place) if number[place as usize] == u32::MAX => Owner::Uneven,
+            Owner::Place(place) if number[place as usize] == u32::MAX => instead,
             other => renumbered(other, &number),
         };
     }

@@ -8,4 +8,4 @@ mod gather;
 pub(crate) use assign::{FARTHEST, Owner};
 pub(crate) use curvature::{Bend, bends};
 pub(crate) use estimate::{Alone, Estimate, FrameSums, Spread, estimate, runs};
-pub(crate) use gather::{Gathered, gather, give_up_uneven, nonempty};
+pub(crate) use gather::{Gathered, gather, give_up, is_even, nonempty};

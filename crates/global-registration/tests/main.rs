@@ -14,6 +14,7 @@ mod common;
 #[path = "../../projective-registration/tests/depth_frames/mod.rs"]
 mod depth_frames;
 mod input;
+mod painted;
 mod pairs;
 mod real;
 mod scenes;

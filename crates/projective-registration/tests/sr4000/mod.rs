@@ -28,13 +28,26 @@ pub fn stations() -> Option<[OrganisedFrame; 2]> {
 
 /// Points of both stations by the mean of some of their four frames, row by row; NaN where one of these is dim.
 pub fn points(frames: &[usize]) -> Option<[Vec<[f64; 3]>; 2]> {
+    let folder = folder()?;
+    Some(["Y1", "Y2"].map(|station| {
+        let ranges = ranges(&folder, station, frames);
+        ranges.iter().enumerate().map(|(pixel, range)| direction(pixel).map(|v| v * range)).collect()
+    }))
+}
+
+/// Amplitudes of a frame of both stations.
+pub fn amplitudes(frame: usize) -> Option<[Vec<f32>; 2]> {
+    let folder = folder()?;
+    Some(["Y1", "Y2"].map(|station| numbers(&mut archive(&folder, station, frame), "amplitude.npy")))
+}
+
+fn folder() -> Option<PathBuf> {
     let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/sr4000_steps"));
-    folder.exists().then(|| {
-        ["Y1", "Y2"].map(|station| {
-            let ranges = ranges(&folder, station, frames);
-            ranges.iter().enumerate().map(|(pixel, range)| direction(pixel).map(|v| v * range)).collect()
-        })
-    })
+    folder.exists().then_some(folder)
+}
+
+fn archive(folder: &Path, station: &str, frame: usize) -> zip::ZipArchive<File> {
+    zip::ZipArchive::new(File::open(folder.join(format!("{station}_{frame}.npz"))).unwrap()).unwrap()
 }
 
 /// Unit direction of a pixel's ray in the camera frame.
@@ -54,8 +67,7 @@ pub fn direction(pixel: usize) -> [f64; 3] {
 fn ranges(folder: &Path, station: &str, frames: &[usize]) -> Vec<f64> {
     let mut mean = vec![0.0; SIZE[0] * SIZE[1]];
     for frame in frames {
-        let file = File::open(folder.join(format!("{station}_{frame}.npz"))).unwrap();
-        let mut archive = zip::ZipArchive::new(file).unwrap();
+        let mut archive = archive(folder, station, *frame);
         let (range, amplitude) = (numbers(&mut archive, "range.npy"), numbers(&mut archive, "amplitude.npy"));
         for ((mean, range), amplitude) in mean.iter_mut().zip(range).zip(amplitude) {
             *mean += if amplitude >= LEAST_AMPLITUDE { f64::from(range) / frames.len() as f64 } else { f64::NAN };

@@ -28,7 +28,8 @@ pub fn run(folder: &Path, rest: &[&str]) -> Outcome {
     compare("voxels", &frames, &pairs, LIMITS, |target, source| Ok(by_voxels(target, source)?.target_from_source))?;
     match (methods, images) {
         (["all"], true) => compare("align", &frames, &pairs, LIMITS, |target, source| {
-            let [target, source] = [target, source].map(|points| with_normals(&frames, points));
+            let size = [frames.camera.width, frames.camera.height];
+            let [target, source] = [target, source].map(|points| with_normals(size, points));
             Ok(align(&source?, &target?, &Isometry3::identity(), &IcpOptions::default())?.target_from_source)
         }),
         (["all"], false) => compare("align_unorganised", &frames, &pairs, LIMITS, |target, source| {
@@ -45,9 +46,9 @@ pub fn by_voxels(target: &Points, source: &Points) -> Result<IcpResult, multivie
     Ok(target?.align(&source?, &Isometry3::identity(), &VoxelAlignmentOptions::default())?)
 }
 
-fn with_normals(frames: &Frames, points: &Points) -> Result<Cloud, multiview_registration::Error> {
-    let normals =
-        organised_normals(points, frames.camera.width, frames.camera.height, &OrganisedNormalOptions::default())?;
+/// A cloud of an image's points with normals.
+pub fn with_normals([width, height]: [usize; 2], points: &[[f64; 3]]) -> Result<Cloud, multiview_registration::Error> {
+    let normals = organised_normals(points, width, height, &OrganisedNormalOptions::default())?;
     Ok(Cloud::from_frame(points, Some(&normals), None)?)
 }
 

@@ -4,6 +4,7 @@
 //! registration_peers simulate WHAT FOLDER     writes frames: large, medium, coarse, degenerate, tracking or stations
 //! registration_peers capture WHAT FOLDER      writes real frames: dense_kitchen, living_room or sr4000; nothing where they are not
 //! registration_peers pairs FOLDER LIST        each pair of a list, from the identity, by frames and by clouds
+//! registration_peers tally FOLDER LIST        how many of them are right, by points too
 //! registration_peers frames FOLDER STRIDE FIRST COUNT [all]      pairs of frames and of clouds, from the identity
 //! registration_peers threads FOLDER           how much faster two threads are, what is possible, whether the bits are the same
 //! registration_peers covariance FOLDER COUNT  covariances against true errors
@@ -60,6 +61,7 @@ fn run() -> Outcome {
         ["simulate", what, folder] => simulate::write(what, Path::new(folder)),
         ["capture", what, folder] => captures::write(what, Path::new(folder)),
         ["pairs", folder, list] => real::pairs(Path::new(folder), Path::new(list)),
+        ["tally", folder, list] => real::tally(Path::new(folder), Path::new(list)),
         ["frames", folder, rest @ ..] => frames::run(Path::new(folder), rest),
         ["threads", folder] => threads::run(Path::new(folder)),
         ["covariance", folder, count] => verdicts::covariance(Path::new(folder), count.parse()?),

@@ -1,7 +1,6 @@
 //! All commands but those of pipelines: what can be typed, and each as one call of the crate of its tasks.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Subcommand;
 use live_tasks::{LiveRequest, StreamTarget};

@@ -78,7 +78,6 @@ fn mean_square_where_each_surface_stands_once(seeds: std::ops::Range<u64>) -> f6
         assert!(rest.frame.is_some() && is_finite(&cloud) && is_finite(&rest));
         squares.push(squared_error_of_wall(&cloud));
     }
-    println!("{squares:?}");
     squares.iter().sum::<f64>() / squares.len() as f64
 }
 

@@ -1,7 +1,6 @@
 //! Absolute counts at one frequency in rooms where one patch in ten is as dark as black cloth: what is sure must be right.
 
 use std::f32::consts::TAU;
-use std::ops::RangeInclusive;
 
 use crate::room::{Patches, Room, View};
 use phase_unwrap::{KnownWraps, SpatialOptions, Unwrapped, Unwrapper};
@@ -10,19 +9,11 @@ pub type Outcome = Result<(), Box<dyn std::error::Error + Send + Sync>>;
 pub type Size = [usize; 2];
 
 const SIZE: Size = [640, 480];
-
-/// Which rooms are looked at.
-struct Rooms {
-    seeds: RangeInclusive<u64>,
-    /// Rooms whose dark patches lie on large objects before the camera.
-    hard: RangeInclusive<u64>,
-    /// Rooms that had no say in any constant of the method.
-    further: RangeInclusive<u64>,
-}
-
-const ALL: Rooms = Rooms { seeds: 1..=6, hard: 7..=12, further: 101..=118 };
-/// A room is one decision about each of its dark objects: the same bars hold for few of them.
-const FEW: Rooms = Rooms { seeds: 1..=2, hard: 7..=8, further: 101..=103 };
+const SEEDS: std::ops::RangeInclusive<u64> = 1..=6;
+/// Rooms whose dark patches lie on large objects before the camera.
+const HARD: std::ops::RangeInclusive<u64> = 7..=12;
+/// Rooms that had no say in any constant of the method.
+const FURTHER: std::ops::RangeInclusive<u64> = 101..=118;
 
 /// Counts of pixels.
 #[derive(Default)]
@@ -95,77 +86,47 @@ fn run(name: &str, seeds: impl Iterator<Item = u64>, patches: Patches, maximum_w
     (total, worst)
 }
 
-fn require_right_with_rays(rooms: &Rooms) {
-    let (score, worst) = run("rays, two wraps", rooms.seeds.clone(), Patches::WithDark, 2, true);
+#[test]
+fn dark_rooms_with_rays_are_right() {
+    let (score, worst) = run("rays, two wraps", SEEDS, Patches::WithDark, 2, true);
     assert!(score.right() > 0.95 && score.unknown() < 0.15, "{} {}", score.right(), score.unknown());
     assert!(worst < 0.01 && score.right_where_certain() > 0.99, "{worst} {}", score.right_where_certain());
 }
 
-fn require_unknown_rather_than_wrong(rooms: &Rooms) {
+#[test]
+fn dark_rooms_by_amplitude_alone_are_unknown_rather_than_wrong() {
     for maximum_wraps in [1, 2] {
         let name = format!("amplitude alone, {maximum_wraps} wraps at most");
-        let (score, worst) = run(&name, rooms.seeds.clone(), Patches::WithDark, maximum_wraps, false);
+        let (score, worst) = run(&name, SEEDS, Patches::WithDark, maximum_wraps, false);
         assert!(score.right() > 0.92 && score.unknown() < 0.3, "{} {}", score.right(), score.unknown());
         assert!(worst < 0.01 && score.right_where_certain() > 0.99, "{worst} {}", score.right_where_certain());
     }
 }
 
-fn require_right_where_plain(rooms: &Rooms) {
-    let (rays, worst) = run("plain, rays, two wraps", rooms.seeds.clone(), Patches::Plain, 2, true);
+#[test]
+fn plain_rooms_stay_right() {
+    let (rays, worst) = run("plain, rays, two wraps", SEEDS, Patches::Plain, 2, true);
     assert!(rays.right() > 0.995 && rays.unknown() < 0.03 && worst < 0.005, "{} {worst}", rays.right());
-    let (alone, worst) = run("plain, amplitude alone, one wrap", rooms.seeds.clone(), Patches::Plain, 1, false);
+    let (alone, worst) = run("plain, amplitude alone, one wrap", SEEDS, Patches::Plain, 1, false);
     assert!(alone.right() > 0.99 && alone.unknown() < 0.13 && worst < 0.005, "{} {worst}", alone.right());
 }
 
-fn require_seldom_wrong(rooms: &Rooms) {
+#[test]
+fn further_dark_rooms_are_seldom_wrong() {
     for (name, maximum_wraps, rays) in [("further, alone", 1, false), ("further, rays", 2, true)] {
-        let (score, worst) = run(name, rooms.further.clone(), Patches::WithDark, maximum_wraps, rays);
+        let (score, worst) = run(name, FURTHER, Patches::WithDark, maximum_wraps, rays);
         assert!(score.right() > 0.94 && score.wrong_among_sure() < 0.01 && worst < 0.05, "{name}");
         assert!(score.right_where_certain() > 0.99, "{name}");
     }
 }
 
-fn require_hardest(rooms: &Rooms) {
+#[test]
+fn large_dark_objects_in_front_are_the_hardest() {
     // Wrong is a single dark object each time: one that hangs together with a wall a cycle behind it, of the same
     // brightness, or one that passes for a common surface a cycle farther away.
     for (name, maximum_wraps, rays, bound) in [("hard, alone", 1, false, 0.06), ("hard, rays", 2, true, 0.03)] {
-        let (score, _) = run(name, rooms.hard.clone(), Patches::WithDark, maximum_wraps, rays);
+        let (score, _) = run(name, HARD, Patches::WithDark, maximum_wraps, rays);
         assert!(score.right() > 0.9 && score.wrong_among_sure() < bound, "{name}");
         assert!(score.right_where_certain() > 0.95, "{name}");
     }
-}
-
-#[test]
-fn dark_rooms_with_rays_are_right() {
-    require_right_with_rays(&FEW);
-}
-
-#[test]
-fn dark_rooms_by_amplitude_alone_are_unknown_rather_than_wrong() {
-    require_unknown_rather_than_wrong(&FEW);
-}
-
-#[test]
-fn plain_rooms_stay_right() {
-    require_right_where_plain(&FEW);
-}
-
-#[test]
-fn further_dark_rooms_are_seldom_wrong() {
-    require_seldom_wrong(&FEW);
-}
-
-#[test]
-fn large_dark_objects_in_front_are_the_hardest() {
-    require_hardest(&FEW);
-}
-
-#[test]
-#[ignore = "long: cargo xtask verify tests"]
-fn all_rooms_are_as_these() {
-    require_right_with_rays(&ALL);
-    require_unknown_rather_than_wrong(&ALL);
-    require_right_where_plain(&ALL);
-    require_seldom_wrong(&ALL);
-    require_hardest(&ALL);
 }

@@ -48,12 +48,12 @@ pub(crate) fn captured(line: &str) -> Result<(String, Outcome), String> {
     Ok((String::from_utf8_lossy(&output.stdout).into_owned(), outcome))
 }
 
-/// Builds the command `rangecam` and runs it where the user stands; its exit code.
+/// Builds the command `rangecam` with the commands of pipelines alone and runs it where the user stands; its exit code.
 ///
 /// The tasks do not link it: those that only check the repository would wait until all of it is built.
 pub(crate) fn rangecam(arguments: &[OsString]) -> Result<u8, String> {
     let status: ExitStatus = Command::new(program())
-        .args(["run", "--package", "rangecam-cli", "--bin", "rangecam", "--manifest-path"])
+        .args(["run", "--package", "rangecam-cli", "--no-default-features", "--bin", "rangecam", "--manifest-path"])
         .arg(root().join("Cargo.toml"))
         .arg("--")
         .args(arguments)

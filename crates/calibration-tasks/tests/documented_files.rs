@@ -8,6 +8,7 @@ use pipeline::{Plan, RunRequest, Silent, Source, Stage, Summary};
 use range_io::survey::Survey;
 
 use crate::common::{fixtures, has_capture, request, simulated};
+use crate::room::require_the_bars_of_the_room;
 
 /// Pipelines of the repository that are run elsewhere or not at all, each with the reason.
 const NOT_RUN_HERE: [(&str, &str); 1] = [("room_small", "run against its bars in room.rs")];
@@ -124,6 +125,7 @@ fn every_pipeline_of_the_repository_runs() {
     for (listed, reason) in NOT_RUN_HERE {
         assert!(names.iter().any(|name| name == listed), "{listed} ({reason}) is not there any more");
     }
+    let mut rooms = 0;
     for name in names.iter().filter(|name| !NOT_RUN_HERE.iter().any(|(listed, _)| listed == name)) {
         let plan = Plan::read(&fixtures().join("pipelines").join(name).with_extension("ron")).unwrap();
         if matches!(&plan.source, Some(Source::Survey { .. })) && !has_capture(name) {
@@ -138,6 +140,9 @@ fn every_pipeline_of_the_repository_runs() {
             // The offset of an estimated calibration is known to 8 mm where a hyperbola is estimated beside it.
             let bar = if plan.calibrate.is_some() { 0.02 } else { 0.002 };
             assert!(truth.position_error_max_m.unwrap() < bar, "{name}: {:?}", truth.position_error_max_m);
+            require_the_bars_of_the_room(&summary, name);
+            rooms += 1;
         }
     }
+    assert_eq!(rooms, 3, "the room and its variants with an estimated calibration and with gross errors");
 }

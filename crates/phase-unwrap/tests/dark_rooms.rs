@@ -12,8 +12,6 @@ const SIZE: Size = [640, 480];
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=6;
 /// Rooms whose dark patches lie on large objects before the camera.
 const HARD: std::ops::RangeInclusive<u64> = 7..=12;
-/// Rooms that had no say in any constant of the method.
-const FURTHER: std::ops::RangeInclusive<u64> = 101..=118;
 
 /// Counts of pixels.
 #[derive(Default)]
@@ -113,8 +111,19 @@ fn plain_rooms_stay_right() {
 
 #[test]
 fn further_dark_rooms_are_seldom_wrong() {
+    require_seldom_wrong(101..=103);
+}
+
+#[test]
+#[ignore = "long: cargo xtask verify tests"]
+fn all_further_dark_rooms_are_seldom_wrong() {
+    require_seldom_wrong(101..=118);
+}
+
+/// Rooms that had no say in any constant of the method; each is held to the same bars.
+fn require_seldom_wrong(rooms: std::ops::RangeInclusive<u64>) {
     for (name, maximum_wraps, rays) in [("further, alone", 1, false), ("further, rays", 2, true)] {
-        let (score, worst) = run(name, FURTHER, Patches::WithDark, maximum_wraps, rays);
+        let (score, worst) = run(name, rooms.clone(), Patches::WithDark, maximum_wraps, rays);
         assert!(score.right() > 0.94 && score.wrong_among_sure() < 0.01 && worst < 0.05, "{name}");
         assert!(score.right_where_certain() > 0.99, "{name}");
     }

@@ -66,11 +66,16 @@ const STAGES: &str = "Demodulate(low_amplitude: 20), Average(), Deconvolve(), Un
 
 /// A room of eight stations on a quarter of the pixels, two frames each.
 fn room(folder: &Path) -> PathBuf {
+    room_with("frames_per_station: 2", folder)
+}
+
+/// The same with other frames.
+fn room_with(frames: &str, folder: &Path) -> PathBuf {
     let text = fs::read_to_string(common::fixtures().join("scenes/room_small.ron")).unwrap();
     let text = text
         .replace("width: 132, height: 108", "width: 66, height: 54")
         .replace("0.05333333333333334", "0.10666666666666667")
-        .replace("frames_per_station: 4", "frames_per_station: 2");
+        .replace("frames_per_station: 4", frames);
     let scene = folder.join("room.ron");
     fs::write(&scene, text).unwrap();
     common::simulated_from(&scene, 1, folder)
@@ -103,8 +108,7 @@ fn parts_made_whole_are_one_run() {
 #[test]
 fn parts_of_other_levels_are_whole_too() {
     let folder = tempfile::tempdir().unwrap();
-    let change = ["frames_per_station: 4", "frames_per_station: 1, further_integration_times_s: [0.001]"];
-    let survey = common::simulated_with("room_small", change, folder.path());
+    let survey = room_with("frames_per_station: 1, further_integration_times_s: [0.001]", folder.path());
     let text = fs::read_to_string(survey.join("survey.ron")).unwrap();
     let truth = text.find("truth:").unwrap();
     // The last field but for those after it, up to the end of its brackets.

@@ -45,35 +45,62 @@ fn is_real(hyperbola: &AmplitudeHyperbola) -> bool {
     })
 }
 
+/// Whatever the residuals are, the hyperbola is real over its span, or there is none.
+fn require_real_or_refused(shape: u32, [height, knee, level]: [f64; 3], offset: bool, seed: u64) {
+    let span = [10.0, 3000.0];
+    let error_m = |a: f64| {
+        level
+            + match shape {
+                // Falls like 1/a, steeper than any hyperbola that is real at zero.
+                0 => height * 10.0 / a,
+                // With a pole just below the smallest amplitude.
+                1 => height / (a - 10.0 + 0.3 * knee),
+                2 => height * (-(a - 10.0) / (10.0 * knee)).exp(),
+                // A step, which no hyperbola follows.
+                3 => {
+                    if a < 10.0 * knee {
+                        height
+                    } else {
+                        0.0
+                    }
+                }
+                // Darker is nearer.
+                _ => -height * 10.0 / (a + knee),
+            }
+    };
+    match estimate(&differences(error_m, span, seed), offset) {
+        Ok(calibration) => {
+            let hyperbola = calibration.model().hyperbola.unwrap();
+            assert!(is_real(&hyperbola), "{hyperbola:?}");
+            assert!(hyperbola.amplitude_span[0] <= 10.0 * (1.0 + 1e-12));
+        }
+        Err(Error::NoHyperbola { .. } | Error::NotDetermined { .. }) => {}
+        Err(other) => panic!("{other}"),
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
 
     #[test]
     fn it_is_real_or_refused_by_name(
         shape in 0..5_u32, height in 0.05..0.5_f64, knee in 0.3..30.0_f64, level in -0.03..0.03_f64,
         offset in any::<bool>(), seed in any::<u64>(),
     ) {
-        let span = [10.0, 3000.0];
-        let error_m = |a: f64| level + match shape {
-            // Falls like 1/a, steeper than any hyperbola that is real at zero.
-            0 => height * 10.0 / a,
-            // With a pole just below the smallest amplitude.
-            1 => height / (a - 10.0 + 0.3 * knee),
-            2 => height * (-(a - 10.0) / (10.0 * knee)).exp(),
-            // A step, which no hyperbola follows.
-            3 => if a < 10.0 * knee { height } else { 0.0 },
-            // Darker is nearer.
-            _ => -height * 10.0 / (a + knee),
-        };
-        match estimate(&differences(error_m, span, seed), offset) {
-            Ok(calibration) => {
-                let hyperbola = calibration.model().hyperbola.unwrap();
-                prop_assert!(is_real(&hyperbola), "{:?}", hyperbola);
-                prop_assert!(hyperbola.amplitude_span[0] <= 10.0 * (1.0 + 1e-12));
-            }
-            Err(Error::NoHyperbola { .. } | Error::NotDetermined { .. }) => {}
-            Err(other) => prop_assert!(false, "{}", other),
-        }
+        require_real_or_refused(shape, [height, knee, level], offset, seed);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    #[ignore = "long: cargo xtask verify tests"]
+    fn it_is_always_real_or_refused_by_name(
+        shape in 0..5_u32, height in 0.05..0.5_f64, knee in 0.3..30.0_f64, level in -0.03..0.03_f64,
+        offset in any::<bool>(), seed in any::<u64>(),
+    ) {
+        require_real_or_refused(shape, [height, knee, level], offset, seed);
     }
 
     #[test]

@@ -6,29 +6,11 @@ use clap::{Parser, Subcommand};
 use pipeline::Part;
 use pipeline::commands::memory::Memory;
 
-use crate::requests::calibration::calibrate_arguments::CalibrateArguments;
-use crate::requests::calibration::check_arguments::CheckArguments;
-use crate::requests::calibration::diff_arguments::DiffArguments;
-use crate::requests::calibration::plan_arguments::PlanArguments;
-use crate::requests::calibration::targets_arguments::TargetsArguments;
-use crate::requests::clouds::colour_arguments::ColourArguments;
-use crate::requests::clouds::compare_arguments::CompareArguments;
-use crate::requests::clouds::fuse_arguments::FuseArguments;
-use crate::requests::clouds::measure_arguments::MeasureArguments;
-use crate::requests::fixed_pattern_arguments::FixedPatternArguments;
-use crate::requests::fleet::fleet_arguments::FleetArguments;
+#[cfg(feature = "every-command")]
+use crate::further_commands::FurtherCommand;
 use crate::requests::fleet::merge_arguments::MergeArguments;
 use crate::requests::fleet::part::part;
-use crate::requests::fleet::workflow_arguments::WorkflowArguments;
-use crate::requests::frames::convert_arguments::ConvertArguments;
-use crate::requests::frames::explain_arguments::ExplainArguments;
-use crate::requests::frames::live_arguments::LiveArguments;
-use crate::requests::noise_arguments::NoiseArguments;
-use crate::requests::orient_arguments::OrientArguments;
-use crate::requests::register_arguments::RegisterArguments;
-use crate::requests::scattering_arguments::ScatteringArguments;
 use crate::requests::values::{at_least_one, not_negative, share};
-use crate::requests::warm_up_arguments::WarmUpArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
 #[derive(Debug, Parser)]
@@ -85,10 +67,6 @@ pub(crate) enum Command {
     },
     /// Make the result of a run of all its parts, as one run would have written it.
     Merge(MergeArguments),
-    /// Write a workflow for an archive of many recordings: what Snakemake runs on this machine, a cluster or a cloud.
-    Workflow(WorkflowArguments),
-    /// One table and one report of all that a workflow did: cameras whose calibration moved, shares of flags, failures by reason.
-    Fleet(FleetArguments),
     /// Simulate a scene and write it as a survey with its truth.
     Simulate {
         /// The scene's RON file.
@@ -120,53 +98,7 @@ pub(crate) enum Command {
         #[arg(long, short)]
         out: Option<PathBuf>,
     },
-    /// Calibrate lens and range terms from a survey of targets or planes, with the quality of every parameter.
-    Calibrate(Box<CalibrateArguments>),
-    /// Find the targets of a calibration in the frames of a survey, or in a folder of images, or print some.
-    Targets(Box<TargetsArguments>),
-    /// Tell how well planned stations and targets would determine a calibration, and which station to add.
-    Plan(Box<PlanArguments>),
-    /// Estimate internal scattering (stray light in the camera) from a scene with and without bright objects.
-    Scattering(Box<ScatteringArguments>),
-    /// Estimate random errors (shot, dark, quantisation, or ranges by amplitude) from repeated frames.
-    Noise(NoiseArguments),
-    /// Estimate the range offset of each pixel (fixed pattern) from walls, and keep it only if it raises the precision.
-    Fpn(FixedPatternArguments),
-    /// Estimate the drift of all ranges while the camera warms up, and tell from when on it is stable.
-    #[command(name = "warmup")]
-    WarmUp(WarmUpArguments),
-    /// Bring a survey's stations or clouds of any format into one frame, with the quality of every pose.
-    Register(RegisterArguments),
-    /// Find where stations stand by targets, by an inertial unit, or by the poses of a tracker, with standard deviations.
-    Orient(Box<OrientArguments>),
-    /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for; of a recording (MCAP, ROS 1 bag,
-    /// Azure Kinect, ADI) its streams with rates and gaps, cameras, temperatures, and where it is cut off.
-    Inspect {
-        /// Survey folder, calibration.ron, cloud.ply, or a recording.
-        path: PathBuf,
-    },
-    /// Convert a recording to a survey's folder or to MCAP, or a survey to MCAP: frame by frame, with their times.
-    Convert(Box<ConvertArguments>),
-    /// Tell whether a calibration is still right for a survey of overlapping stations, by surfaces that they have in common: which
-    /// terms moved, and what that does in millimetres. Exit code 0: it is, 1: it is not, 3: the survey cannot tell.
-    Check(CheckArguments),
-    /// Tell which differences of two calibrations are significant: parameters, range correction, image. Exit code 0:
-    /// none, 1: some, 2: they cannot be compared.
-    Diff(DiffArguments),
-    /// Tell what each correction did to one pixel's range, in millimetres, and what its flags mean.
-    Explain(ExplainArguments),
-    /// Take frames as they come, from a pipe, a socket, a folder that fills or a recording, to clouds, a status line and a page in the
-    /// browser. What comes faster than it is processed is dropped frame by frame, and counted.
-    Live(Box<LiveArguments>),
-    /// Put the colours of one camera of a rig onto the points of another, exposed at the same moment; points that it does not see get
-    /// none.
-    Colour(ColourArguments),
-    /// Fuse the frames of a result into one cloud without double walls, each point with its standard deviation from all sources.
-    Fuse(FuseArguments),
-    /// Measure lengths, angles, radii, flatness and volumes between named regions of a result's cloud, each with its standard
-    /// deviation from noise, sensor, calibration, drift and poses, and their shares.
-    Measure(MeasureArguments),
-    /// Compare two results: clouds (PLY, PCD, E57, VTK, xyz), trajectories (TUM, KITTI, EuRoC, Redwood log, 7-Scenes
-    /// folder), stations.csv, or output folders.
-    Compare(CompareArguments),
+    #[cfg(feature = "every-command")]
+    #[command(flatten)]
+    Further(FurtherCommand),
 }

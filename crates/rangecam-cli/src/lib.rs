@@ -1,4 +1,6 @@
 #![doc = include_str!("../README.md")]
+// What checks and hands on arguments is written for every command.
+#![cfg_attr(not(feature = "every-command"), allow(dead_code, unused_variables))]
 
 mod arguments;
 mod bar;
@@ -6,8 +8,11 @@ mod call;
 mod commands;
 mod escape;
 mod exit;
+#[cfg(feature = "every-command")]
+mod further_commands;
 mod output;
 mod requests;
+#[cfg(feature = "every-command")]
 mod status_line;
 
 use std::ffi::OsString;

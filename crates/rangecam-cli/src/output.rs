@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::arguments::Arguments;
 use crate::bar::Bar;
+#[cfg(feature = "every-command")]
 use crate::status_line::StatusLine;
 use crate::{escape, exit};
 
@@ -70,6 +71,7 @@ impl Output {
     }
 
     /// The line that tells how a stream stands.
+    #[cfg(feature = "every-command")]
     pub(crate) fn status_line(&self) -> StatusLine {
         match self.voice {
             Voice::Words => StatusLine::on_terminal(),

@@ -80,8 +80,14 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// A folder with what the lines name: surveys of targets or of frames, calibrations, a pipeline.
-fn furnished(line: &str) -> tempfile::TempDir {
+fn simulate(scene: &str, folder: &Path) {
+    let scene = root().join("fixtures/scenes").join(scene);
+    let (code, said) = rangecam(&["simulate", scene.to_str().unwrap(), "--out", "survey"], folder);
+    assert_eq!(code, Some(0), "{said}");
+}
+
+/// A folder with what the lines name: surveys of targets or of frames, calibrations, a pipeline. `room` holds the small room as a survey.
+fn furnished(line: &str, room: &Path) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let fixtures = root().join("fixtures");
@@ -104,16 +110,14 @@ fn furnished(line: &str) -> tempfile::TempDir {
         draw(&at("images/1.png"));
         return folder;
     }
-    let spheres = line.contains(" spheres ");
-    let scene = fixtures.join("scenes").join(if spheres { "spheres.ron" } else { "room_small.ron" });
-    let (code, said) = rangecam(&["simulate", scene.to_str().unwrap(), "--out", "survey"], folder.path());
-    assert_eq!(code, Some(0), "{said}");
-    if spheres {
+    if line.contains(" spheres ") {
+        simulate("spheres.ron", folder.path());
         let places =
             "A,-0.5,0.35,0.5,,,\nB,0.45,0.3,0.3,,,\nC,0.35,-0.4,0.6,,,\nD,-0.4,-0.35,0.2,,,\nE,0.0,0.05,0.4,,,\n";
         std::fs::write(at("survey/targets.csv"), format!("target,x,y,z,sigma_x,sigma_y,sigma_z\n{places}")).unwrap();
         return folder;
     }
+    copy(&room.join("survey"), &at("survey"));
     if line.contains(" archive ") {
         std::fs::create_dir_all(at("archive/north/2026-05-04/hall")).unwrap();
     }
@@ -136,9 +140,11 @@ fn every_line_of_the_command_runs() {
     for (listed, reason) in NOT_RUN {
         assert!(lines.iter().any(|(_, line)| line.starts_with(listed)), "{listed} ({reason}) is not shown any more");
     }
+    let room = tempfile::tempdir().unwrap();
+    simulate("room_small.ron", room.path());
     for (place, line) in lines.iter().filter(|(_, line)| !NOT_RUN.iter().any(|(listed, _)| line.starts_with(listed))) {
         println!("{place}: {line}");
-        let folder = furnished(line);
+        let folder = furnished(line, room.path());
         let words = words(line);
         let arguments: Vec<&str> = words[1..].iter().map(String::as_str).collect();
         let (code, said) = rangecam(&arguments, folder.path());

@@ -1,5 +1,6 @@
 //! `cargo xtask verify [NAME ...]`: long statistics, each an example of its crate that prints its figures and fails where
-//! they leave their bounds; and `memory`, which runs the command on long surveys. What `docs/benchmarks.md` states of them comes from here.
+//! they leave their bounds; `memory`, which runs the command on long surveys; and `tests`, the tests that are too long for every change.
+//! What `docs/benchmarks.md` states of them comes from here.
 
 pub(crate) mod fuzz;
 pub(crate) mod memory;
@@ -18,8 +19,9 @@ const STATISTICS: &[(&str, &str, &str)] = &[
     ("rigs", "rig-calibration", "rigs"),
 ];
 
-/// The one that is no example.
+/// Those that are no examples.
 const MEMORY: &str = "memory";
+const TESTS: &str = "tests";
 
 /// Which statistics to run.
 #[derive(Debug, clap::Args)]
@@ -38,7 +40,7 @@ impl Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
-    let known = || STATISTICS.iter().map(|(name, ..)| *name).chain([MEMORY]);
+    let known = || STATISTICS.iter().map(|(name, ..)| *name).chain([MEMORY, TESTS]);
     if let Some(unknown) = arguments.names.iter().find(|name| !known().any(|known| known == name.as_str())) {
         return Err(format!(
             "there is no statistic `{unknown}`; there are: {}",
@@ -48,6 +50,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let asked = |name: &str| arguments.names.is_empty() || arguments.names.iter().any(|asked| asked == name);
     for (_, package, example) in STATISTICS.iter().filter(|(name, ..)| asked(name)) {
         cargo(&["run", "--release", "--package", package, "--all-features", "--example", example], &[])?;
+    }
+    if asked(TESTS) {
+        // What `cargo xtask test` does with an eighth of the cases, and the tests say which, is marked as ignored there.
+        cargo(&["test", "--workspace", "--all-features", "--lib", "--bins", "--tests", "--", "--ignored"], &[])?;
     }
     if asked(MEMORY) { memory::run(&arguments.memory) } else { Ok(()) }
 }

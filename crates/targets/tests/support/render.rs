@@ -57,7 +57,8 @@ pub fn render(
             |pose: &Isometry3<f64>| (0..=fine[0]).map(|col| hit(camera, pose, [position(col), row])).collect();
         plane_from_camera.iter().map(on_plane).collect()
     };
-    let half_diagonal = 0.5 * (width as f64).hypot(height as f64);
+    // Square of the distance of a corner from the centre.
+    let corner = 0.25 * ((width * width + height * height) as f64);
     let centre = [0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)];
     let mut samples = Vec::with_capacity(fine[0] * fine[1]);
     let mut above = hits(position(0));
@@ -65,14 +66,15 @@ pub fn render(
         let below = hits(position(row + 1));
         for col in 0..fine[0] {
             let pixel = [position(col), position(row)];
-            let radius = (pixel[0] - centre[0]).hypot(pixel[1] - centre[1]) / half_diagonal;
+            let off_centre = [pixel[0] - centre[0], pixel[1] - centre[1]];
+            let lost = optics.vignetting * (off_centre[0] * off_centre[0] + off_centre[1] * off_centre[1]) / corner;
             let seen = (0..planes.len()).find_map(|plane| {
                 let (here, right, down) = (above[plane][col]?, above[plane][col + 1]?, below[plane][col]?);
                 let footprint = [[right[0] - here[0], right[1] - here[1]], [down[0] - here[0], down[1] - here[1]]];
                 planes[plane].pattern.reflectance(here, footprint)
             });
             let reflectance = (optics.before)(pixel).or(seen).unwrap_or(optics.background);
-            samples.push((reflectance * (1.0 - optics.vignetting * radius * radius)) as f32);
+            samples.push((reflectance * (1.0 - lost)) as f32);
         }
         above = below;
     }

@@ -36,7 +36,6 @@ const TRUTH: [(&str, f64); 6] =
     [("length", 7.5), ("width", 6.0), ("table", 0.745), ("globe", 0.2), ("globe to lamp", 1.809_73), ("corner", 90.0)];
 
 #[test]
-#[ignore = "long: cargo xtask verify tests"]
 fn a_room_without_a_target_is_calibrated_corrected_checked_and_measured() {
     let desk = Desk::new();
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes/room_small.ron");

@@ -17,7 +17,6 @@ fn room_error(desk: &Desk, calibration: &str) -> f64 {
 }
 
 #[test]
-#[ignore = "long: cargo xtask verify tests"]
 fn boards_alone_calibrate_the_ranges_of_a_room() {
     let desk = Desk::new();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes");

@@ -9,6 +9,7 @@ mod fixtures;
 mod peers;
 mod pipeline_task;
 mod shell;
+mod suites;
 mod test;
 mod tidy;
 mod verify;

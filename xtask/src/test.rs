@@ -1,6 +1,7 @@
 //! `cargo xtask test`: what must be green.
 
 use crate::shell::{Outcome, cargo};
+use crate::suites;
 use crate::tidy;
 
 pub(crate) fn run() -> Outcome {
@@ -9,7 +10,7 @@ pub(crate) fn run() -> Outcome {
     cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"], &[])?;
     // The tests of `calibration-tasks` and `tasks` hold the small room and the real captures against their bars.
     // Examples are compiled by clippy above; linking them would take a minute.
-    cargo(&["test", "--workspace", "--all-features", "--lib", "--bins", "--tests"], &[])?;
+    suites::run()?;
     // Links of the documentation (cold three minutes) and `cargo xtask alone`, which checks forty packages of their own (six), are
     // part of `cargo xtask nightly`.
     cargo(&["test", "--workspace", "--all-features", "--doc"], &[])

@@ -151,6 +151,9 @@ fn many_surfaces_that_cannot_both_be_there_are_a_doubt() {
     folder.write_cloud(&[]);
     let summary = fused(&folder).unwrap();
     assert!(summary.contradicted_points * 20 > summary.fused_points, "{}", summary.contradicted_points);
+    // Three others saw through what one saw.
+    assert!(summary.outvoted_points > 0 && summary.unfused["outvoted"] > 0, "{:?}", summary.unfused);
+    assert!(summary.findings.iter().any(|finding| finding.contains("were given up")), "{:?}", summary.findings);
     let most = summary.contradictions.iter().max_by_key(|found| found.pairs).unwrap();
     assert!(most.front == "S1" && (most.median_distance_m - 0.2).abs() < 0.01, "{most:?}");
     let doubt = summary.doubts.iter().find(|doubt| doubt.words.contains("saw through")).unwrap();

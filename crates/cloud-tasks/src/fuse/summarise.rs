@@ -204,6 +204,13 @@ fn findings(summary: &mut FuseSummary, fused: &Fused, is_depth_camera: bool) {
             "{share:.0} % of the fused points were seen by one frame only: nothing could contradict them."
         ));
     }
+    if fused.outvoted > 0 {
+        summary.findings.push(format!(
+            "{} fused points were given up, since twice as many frames spoke against them as for them; their points are among those \
+             that are in none.",
+            fused.outvoted
+        ));
+    }
     summary.findings.extend(disagreement(fused));
 }
 
@@ -246,12 +253,10 @@ fn doubts(summary: &mut FuseSummary) {
         });
         let words = format!(
             "{} of {all} fused points cannot be there beside what other frames saw ({:.1} %; up to {:.0} % is what one who walks by \
-             hides), of which {} were given up, for more frames spoke against them than for them{worst}: something moved, or a pose is wrong \
-             by more than stated",
+             hides){worst}: something moved, or a pose is wrong by more than stated",
             summary.contradicted_points,
             100.0 * share,
             100.0 * MANY_CONTRADICTIONS,
-            summary.outvoted_points
         );
         summary.doubts.push(Doubt::new(DoubtKind::Contradiction, words));
     }

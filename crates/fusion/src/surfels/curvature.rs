@@ -29,8 +29,6 @@ const EDGE: f64 = 0.05;
 const ENOUGH: usize = 6;
 /// Cells around that are asked; one more where the plane is weak.
 const REACH: i64 = 2;
-/// Fewest neighbours that a weak plane goes on from: a plane has three.
-const SUPPORT: usize = 3;
 /// Largest height of a neighbour over the plane, parts of its distance: the tangent of 30°.
 const STEEPEST: f64 = 0.577;
 /// Probability that neighbours on one smooth surface are taken for those of an edge.
@@ -112,8 +110,6 @@ fn bend<'a>(
         let own = place.own_variance() / (voxel_m * voxel_m);
         solution[0] / (covariance[(0, 0)] + own).sqrt()
     });
-    // What no plane goes on from is told by nothing but itself.
-    let off = if is_weak && rows.len() < SUPPORT { f64::INFINITY } else { off };
     let variance = by_curvature.norm_squared() * (BEND * voxel_m).powi(2);
     let unknown = Bend { above_m: 0.0, variance, off, is_flat: false };
     solve(&rows, deviations, BEND).map_or(unknown, |(solution, covariance)| {

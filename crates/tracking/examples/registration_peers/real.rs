@@ -12,7 +12,7 @@ use crate::common::pose_error;
 use crate::cpu_clock::cpu_seconds;
 use crate::files::Frames;
 use crate::frames::{Stream, by_voxels, with_normals};
-use crate::pairs::median;
+use crate::pairs::{Points, median};
 
 /// A pose is right within this of the reference, or within a share of the motion.
 const RIGHT: [f64; 2] = [40.0, 2.0];
@@ -24,9 +24,22 @@ const EACH: usize = 4;
 /// Prints for each pair of a list (target and source a line) and both ways `NAME ms deg mm sure deg mm`: CPU time, how
 /// far off the reference, whether the pose is trusted, and the motion. A pair without an answer is infinitely far off.
 pub fn pairs(folder: &Path, list: &Path) -> Outcome {
+    each_pair(folder, list, |_, _, stream, points, truth| {
+        print("organised", truth, || stream.align(&points[0], &points[1]));
+        print("voxels", truth, || by_voxels(&points[0], &points[1]));
+        Ok(())
+    })
+}
+
+/// Hands on each pair of a list: its number, all frames, their aligner, the points of target and source, and the reference.
+fn each_pair(
+    folder: &Path,
+    list: &Path,
+    mut hand_on: impl FnMut(usize, &Frames, &mut Stream, &[Points; 2], &Isometry3<f64>) -> Outcome,
+) -> Outcome {
     let frames = Frames::open(folder)?;
     let mut stream = None;
-    for line in std::fs::read_to_string(list)?.lines() {
+    for (k, line) in std::fs::read_to_string(list)?.lines().enumerate() {
         let numbers = line.split_whitespace().map(str::parse).collect::<Result<Vec<usize>, _>>()?;
         let &[target, source] = numbers.as_slice() else { return Err(format!("{line}: two frames").into()) };
         let points = [frames.points(target)?, frames.points(source)?];
@@ -34,9 +47,7 @@ pub fn pairs(folder: &Path, list: &Path) -> Outcome {
             Some(stream) => stream,
             none => none.insert(Stream::new(&frames, &points[0])?),
         };
-        let truth = frames.truth([target, source]);
-        print("organised", &truth, || stream.align(&points[0], &points[1]));
-        print("voxels", &truth, || by_voxels(&points[0], &points[1]));
+        hand_on(k, &frames, stream, &points, &frames.truth([target, source]))?;
     }
     Ok(())
 }
@@ -54,30 +65,21 @@ fn print(name: &str, truth: &Isometry3<f64>, align: impl FnOnce() -> Result<IcpR
 /// Prints for frames, for clouds and, for every fourth pair and pixel, for each metric of points how many pairs of a list are
 /// right, and of these how far off and known to how much in the median.
 pub fn tally(folder: &Path, list: &Path) -> Outcome {
-    let frames = Frames::open(folder)?;
-    let mut stream = None;
     let metrics = [Metric::PointToPlane, Metric::SymmetricPlanes, Metric::PlaneToPlane, Metric::PointToPoint];
     let mut tallies: [Tally; 6] = Default::default();
-    for (k, line) in std::fs::read_to_string(list)?.lines().enumerate() {
-        let numbers = line.split_whitespace().map(str::parse).collect::<Result<Vec<usize>, _>>()?;
-        let &[target, source] = numbers.as_slice() else { return Err(format!("{line}: two frames").into()) };
-        let points = [frames.points(target)?, frames.points(source)?];
-        let stream = match &mut stream {
-            Some(stream) => stream,
-            none => none.insert(Stream::new(&frames, &points[0])?),
-        };
-        let truth = frames.truth([target, source]);
+    each_pair(folder, list, |k, frames, stream, points, truth| {
         let [organised, voxels, by_points @ ..] = &mut tallies;
-        organised.add(stream.align(&points[0], &points[1]).ok(), &truth);
-        voxels.add(by_voxels(&points[0], &points[1]).ok(), &truth);
+        organised.add(stream.align(&points[0], &points[1]).ok(), truth);
+        voxels.add(by_voxels(&points[0], &points[1]).ok(), truth);
         if k % EACH == 0 {
-            let [target, source] = [thinned(&frames, &points[0])?, thinned(&frames, &points[1])?];
+            let [target, source] = [thinned(frames, &points[0])?, thinned(frames, &points[1])?];
             for (metric, tally) in metrics.into_iter().zip(by_points) {
                 let options = IcpOptions { metric, ..IcpOptions::default() };
-                tally.add(align(&source, &target, &Isometry3::identity(), &options).ok(), &truth);
+                tally.add(align(&source, &target, &Isometry3::identity(), &options).ok(), truth);
             }
         }
-    }
+        Ok(())
+    })?;
     let names = ["organised", "voxels"].map(str::to_owned).into_iter().chain(metrics.map(|m| format!("{m:?}")));
     for (name, tally) in names.zip(tallies) {
         tally.print(&name);

@@ -108,7 +108,9 @@ fn through(
         return None;
     }
     let distance_m = -near.normal.dot(&(place - near.position));
-    let sigma_m = near.sigma_m().hypot(far.sigma_m());
+    // Shapes have their own limit.
+    let variance = |surfel: &Surfel| surfel.shares.variance() + surfel.disagreement_variance();
+    let sigma_m = (variance(near) + variance(far)).sqrt();
     let sight = place - scene.centres[frame as usize];
     let foot = place + sight * (distance_m / near.normal.dot(&sight));
     let is_solid = (foot - near.position).norm() <= SOLID * near.radius_m;

@@ -153,12 +153,21 @@ fn repeated(count: usize, targets_count: usize, with_ranges: bool, wrong: usize)
     [poses / freedom, places / placed, unit / used, missed as f64 / used]
 }
 
-/// A component's normalised square has mean 1 and variance 2: over 200 runs of six independent ones the mean scatters by 0.04.
 #[test]
 fn the_covariance_is_that_of_repeated_networks() {
-    for (stations, targets, with_ranges, wrong) in
-        [(2, 4, true, 0), (3, 7, false, 0), (3, 12, true, 6), (4, 14, false, 6)]
-    {
+    require_true_covariances(&[(2, 4, true, 0), (3, 7, false, 0), (3, 12, true, 6)]);
+}
+
+#[test]
+#[ignore = "long: cargo xtask verify tests"]
+fn the_covariance_is_that_of_repeated_networks_of_images_with_gross_errors() {
+    require_true_covariances(&[(4, 14, false, 6)]);
+}
+
+/// Of networks of so many stations and targets, with ranges or without, with so many gross errors. A component's normalised square has
+/// mean 1 and variance 2: over 200 runs of six independent ones the mean scatters by 0.04.
+fn require_true_covariances(networks: &[(usize, usize, bool, usize)]) {
+    for &(stations, targets, with_ranges, wrong) in networks {
         let [poses, points, unit, missed] = repeated(stations, targets, with_ranges, wrong);
         let case = format!("{stations} {targets} {with_ranges} {wrong}: {poses:.3} {points:.3} {unit:.3} {missed:.3}");
         eprintln!("{case}");

@@ -105,11 +105,22 @@ fn repeated(count: usize, wrong: usize, runs: u64) -> [f64; 4] {
     [pose / runs, points / f64::from(found_points), unit / runs, missed as f64]
 }
 
-/// Chi-squared of five has mean 5 and variance 10: over 200 runs it scatters by 0.22; 10 % are 0.5.
 #[test]
 fn the_covariance_is_that_of_repeated_orientations() {
+    require_true_covariances(50);
+}
+
+#[test]
+#[ignore = "long: cargo xtask verify tests"]
+fn the_covariance_is_that_of_two_hundred_orientations() {
+    require_true_covariances(200);
+}
+
+/// Chi-squared of five has mean 5 and variance 10: over 200 runs it scatters by 0.22, over 50 by 0.45; 10 % are 0.5. The first of the
+/// runs are the same, and held to the same bounds.
+fn require_true_covariances(runs: u64) {
     for (count, wrong) in [(20, 0), (12, 0), (25, 5)] {
-        let [pose, points, unit, missed] = repeated(count, wrong, 200);
+        let [pose, points, unit, missed] = repeated(count, wrong, runs);
         eprintln!("{count} {wrong}: pose {pose}, points {points}, variance {unit}, missed {missed}");
         assert!((pose - 5.0).abs() < 0.5, "{count} {wrong}: pose {pose}");
         assert!((points - 3.0).abs() < 0.3, "{count} {wrong}: points {points}");

@@ -3,6 +3,7 @@
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 
 use tempfile::TempDir;
 
@@ -14,14 +15,36 @@ fn rangecam() -> Command {
     Command::new(env!("CARGO_BIN_EXE_rangecam"))
 }
 
-/// A folder with the survey of a small room.
+/// A folder with the survey of a small room, which is simulated once for all tests.
 fn room() -> TempDir {
+    static FILES: OnceLock<Vec<(PathBuf, Vec<u8>)>> = OnceLock::new();
+    let folder = tempfile::tempdir().unwrap();
+    for (file, bytes) in FILES.get_or_init(simulated_room) {
+        let file = folder.path().join(file);
+        std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+        std::fs::write(file, bytes).unwrap();
+    }
+    folder
+}
+
+/// The files of the small room's survey.
+fn simulated_room() -> Vec<(PathBuf, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes/room_small.ron");
     let made =
         rangecam().arg("simulate").arg(scene).args(["--out", "survey", "-q"]).current_dir(folder.path()).status();
     assert!(made.unwrap().success());
-    folder
+    let (mut folders, mut files) = (vec![folder.path().join("survey")], Vec::new());
+    while let Some(next) = folders.pop() {
+        for path in std::fs::read_dir(next).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                files.push((path.strip_prefix(folder.path()).unwrap().to_owned(), std::fs::read(&path).unwrap()));
+            }
+        }
+    }
+    files
 }
 
 /// The survey's frames as a camera's program would send them.

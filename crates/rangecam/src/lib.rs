@@ -8,6 +8,9 @@ pub mod maths {
     #[cfg(feature = "dense-matrices")]
     #[doc(inline)]
     pub use dense_matrices;
+    #[cfg(feature = "fourier-transforms")]
+    #[doc(inline)]
+    pub use fourier_transforms;
     #[cfg(feature = "observation-equations")]
     #[doc(inline)]
     pub use observation_equations;

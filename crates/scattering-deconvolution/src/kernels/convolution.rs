@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use fourier_transforms::{Fft, FftDirection, SinglePlanner, num_complex::Complex};
 use rayon::prelude::*;
-use rustfft::{Fft, FftDirection, FftPlanner, num_complex::Complex};
 
 use crate::{Error, Result};
 
@@ -36,10 +36,9 @@ impl Convolver {
     /// For images of `size` (columns, rows) and kernels that reach as far as `reach`.
     pub(crate) fn new(size: [usize; 2], reach: [usize; 2]) -> Result<Self> {
         let padded = padded_size(size, reach)?;
-        let mut planner = FftPlanner::new();
-        let mut plans = |length| {
-            [FftDirection::Forward, FftDirection::Inverse].map(|direction| planner.plan_fft(length, direction))
-        };
+        let mut planner = SinglePlanner::new();
+        let mut plans =
+            |length| [FftDirection::Forward, FftDirection::Inverse].map(|direction| planner.plan(length, direction));
         let (row_plans, column_plans) = (plans(padded[0]), plans(padded[1]));
         let zeros = |length| vec![Complex::new(0.0, 0.0); length];
         Ok(Self {

@@ -6,9 +6,9 @@
 
 use std::f64::consts::TAU;
 
+use fourier_transforms::num_complex::Complex;
 use range_image::with_wide_registers;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex;
 
 use crate::kernels::lanes::{self, LANES};
 use crate::kernels::spectrum::Spectrum;

@@ -3,7 +3,7 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
-use rustfft::num_complex::Complex;
+use fourier_transforms::num_complex::Complex;
 
 /// Values that are worked side by side.
 pub(crate) const LANES: usize = 8;

@@ -1,6 +1,6 @@
 //! Scattering on the nodes of a grid: a sum of convolutions with factors over the field.
 
-use rustfft::num_complex::Complex;
+use fourier_transforms::num_complex::Complex;
 
 use crate::kernels::convolution::{Convolver, Transfer};
 use crate::kernels::parts::Orientation;

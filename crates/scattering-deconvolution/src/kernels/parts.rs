@@ -1,6 +1,6 @@
 //! A point spread function taken apart into convolutions.
 
-use rustfft::num_complex::Complex;
+use fourier_transforms::num_complex::Complex;
 
 use crate::kernels::blobs::{Blob, Kernel};
 use crate::kernels::grid::{Axis, Grid};

@@ -1,6 +1,6 @@
 //! Spectra of kernels, in double precision; made once, when a restorer is made.
 
-use rustfft::{FftDirection, FftPlanner, num_complex::Complex};
+use fourier_transforms::{DoublePlanner, FftDirection, num_complex::Complex};
 
 use crate::kernels::blobs::Kernel;
 use crate::kernels::convolution::Transfer;
@@ -26,9 +26,9 @@ impl Spectrum {
     /// Transforms both axes; the inverse is not scaled.
     pub(crate) fn transformed(mut self, direction: FftDirection) -> Self {
         let [columns, rows] = self.size;
-        let mut planner = FftPlanner::new();
-        planner.plan_fft(rows, direction).process(&mut self.values);
-        let along_rows = planner.plan_fft(columns, direction);
+        let mut planner = DoublePlanner::new();
+        planner.plan(rows, direction).process(&mut self.values);
+        let along_rows = planner.plan(columns, direction);
         let mut line = vec![Complex::new(0.0, 0.0); columns];
         for row in 0..rows {
             for (value, column) in line.iter_mut().zip(self.values.chunks_exact(rows)) {

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use fourier_transforms::num_complex::Complex;
 use range_image::ComplexChannel;
-use rustfft::num_complex::Complex;
 
 /// Blocks along the longer side of an image.
 const BLOCKS: usize = 32;

@@ -3,8 +3,8 @@
 mod blocks;
 mod shape;
 
+use fourier_transforms::num_complex::Complex;
 use range_image::{ComplexChannel, Flags, Raster};
-use rustfft::num_complex::Complex;
 
 use crate::kernels::convolution::check_size;
 use crate::{Error, Psf, Result};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::SQRT_2;
 
-use rustfft::num_complex::Complex;
+use fourier_transforms::num_complex::Complex;
 
 use super::Side;
 use super::blocks::Block;

@@ -1,7 +1,7 @@
 //! Pixels whose correction depends strongly on light that is not known.
 
+use fourier_transforms::num_complex::Complex;
 use range_image::with_wide_registers;
-use rustfft::num_complex::Complex;
 
 use crate::kernels::lanes::{any_exceeds, smallest_square};
 use crate::restoration::mask::Mask;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use rustfft::num_complex::Complex;
+use fourier_transforms::num_complex::Complex;
 
 use crate::kernels::blobs::Kernel;
 use crate::kernels::convolution::{Convolver, Transfer};

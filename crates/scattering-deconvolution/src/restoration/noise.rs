@@ -1,6 +1,6 @@
 //! What restoring does to noise.
 
-use rustfft::{FftDirection, num_complex::Complex};
+use fourier_transforms::{FftDirection, num_complex::Complex};
 
 use crate::kernels::grid::Grid;
 use crate::kernels::operator::{Factors, Operator, Term};

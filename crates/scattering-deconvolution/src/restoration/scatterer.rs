@@ -1,4 +1,4 @@
-use rustfft::num_complex::Complex;
+use fourier_transforms::num_complex::Complex;
 
 use crate::kernels::convolution::{Convolver, check_size};
 use crate::kernels::grid::Grid;

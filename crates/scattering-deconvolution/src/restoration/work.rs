@@ -1,6 +1,6 @@
 //! The iteration that finds the scattered light.
 
-use rustfft::num_complex::Complex;
+use fourier_transforms::num_complex::Complex;
 
 use crate::kernels::convolution::Convolver;
 use crate::kernels::grid::Grid;

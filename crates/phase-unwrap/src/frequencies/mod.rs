@@ -11,3 +11,4 @@ pub(crate) mod lattice;
 pub(crate) mod logarithm;
 pub(crate) mod multi_frequency;
 pub(crate) mod phasor;
+pub(crate) mod rows;

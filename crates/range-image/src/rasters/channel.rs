@@ -23,6 +23,17 @@ pub struct ComplexChannel {
     pub sigma: Raster<f32>,
 }
 
+/// What is derived of some pixels of a complex image.
+#[derive(Debug)]
+pub struct PolarPixels<'a> {
+    /// As [`ComplexChannel::phase`].
+    pub phase: &'a mut [f32],
+    /// As [`ComplexChannel::amplitude`].
+    pub amplitude: &'a mut [f32],
+    /// As [`ComplexChannel::sigma_phase`], times a unit.
+    pub sigma: &'a mut [f32],
+}
+
 impl ComplexChannel {
     /// A channel of NaN with an offset plane.
     pub(crate) fn without_data(modulation: Modulation, width: usize, height: usize) -> Self {
@@ -131,6 +142,26 @@ impl ComplexChannel {
         planes.zip(parts).for_each(|(((phase, amplitude), sigma), ((re, im), given))| {
             run_wide(re.len(), PolarSigmaLoop { polar: PolarLoop { re, im, phase, amplitude }, given, sigma, unit });
         });
+        Ok(())
+    }
+
+    /// As [`Self::phase_amplitude_and_sigma_into`], of the pixels from `first` on (counted row by row), as many as `out` has room for.
+    ///
+    /// Fails where the slices differ in length or reach beyond the image.
+    pub fn phase_amplitude_and_sigma_of(&self, first: usize, out: PolarPixels<'_>, unit: f32) -> Result<()> {
+        let PolarPixels { phase, amplitude, sigma } = out;
+        let count = phase.len();
+        let of_plane = |plane: &Raster<f32>| plane.as_slice().get(first..).is_some_and(|rest| rest.len() >= count);
+        let inside = [&self.real, &self.imaginary, &self.sigma].into_iter().all(of_plane);
+        if !inside || amplitude.len() != count || sigma.len() != count {
+            let (width, height) = (self.real.width(), self.real.height());
+            let (found_width, found_height) = (first.saturating_add(count.max(amplitude.len()).max(sigma.len())), 1);
+            let what = "pixels to evaluate";
+            return Err(crate::Error::SizeMismatch { what, width, height, found_width, found_height });
+        }
+        let [re, im, given] =
+            [&self.real, &self.imaginary, &self.sigma].map(|plane| &plane.as_slice()[first..first + count]);
+        run_wide(count, PolarSigmaLoop { polar: PolarLoop { re, im, phase, amplitude }, given, sigma, unit });
         Ok(())
     }
 

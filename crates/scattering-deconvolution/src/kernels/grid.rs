@@ -14,7 +14,7 @@ use crate::kernels::lanes::{self, LANES};
 use crate::kernels::spectrum::Spectrum;
 
 /// Rows of pixels that one task takes at least; smaller tasks cost more to hand out than to do.
-const ROWS_PER_TASK: usize = 16;
+pub(crate) const ROWS_PER_TASK: usize = 16;
 
 /// One image axis: its pixels and its nodes.
 pub(crate) struct Axis {

@@ -1,6 +1,7 @@
 //! Propagation of noise through a restoration.
 
 use range_image::with_wide_registers;
+use rayon::prelude::*;
 
 use crate::kernels::lanes::finite_extremes;
 use crate::restoration::mask::Mask;
@@ -9,6 +10,8 @@ use crate::restoration::work::Work;
 
 /// Share of a variance below which what other pixels add is left out: 0.05 % of sigma.
 const NEGLIGIBLE: f64 = 1e-3;
+/// Pixels that one task takes; smaller tasks cost more to hand out than to do.
+const CHUNK: usize = 1 << 15;
 
 impl Work {
     /// Turns the standard deviations of the observed image into those of the restored one, in place.
@@ -16,11 +19,14 @@ impl Work {
     /// The noise of pixels is independent before and correlated afterwards; sigma is that of each pixel by itself.
     /// Pixels put aside keep their sigma and, as filled or clipped values, bring no noise to others. NaN stays NaN.
     pub(crate) fn propagate_sigma(&mut self, sigma: &mut [f32], mask: &Mask) {
-        let [least, most] = with_wide_registers(
-            #[inline(always)]
-            || finite_extremes(sigma),
-        )
-        .map(|value| f64::from(value).powi(2));
+        let extremes = sigma.par_chunks(CHUNK).map(|sigma| {
+            with_wide_registers(
+                #[inline(always)]
+                || finite_extremes(sigma),
+            )
+        });
+        let wider = |a: [f32; 2], b: [f32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let [least, most] = extremes.reduce(|| [f32::INFINITY, 0.0], wider).map(|value| f64::from(value).powi(2));
         if most <= 0.0 {
             return;
         }
@@ -59,9 +65,7 @@ fn scale(sigma: &mut [f32], centre: &Centre) {
     match centre {
         Centre::Same(centre) => {
             let gain = (1.0 - centre).abs() as f32;
-            for value in sigma {
-                *value *= gain;
-            }
+            sigma.par_chunks_mut(CHUNK).for_each(|sigma| sigma.iter_mut().for_each(|value| *value *= gain));
         }
         Centre::Pixels(centres) => {
             sigma.iter_mut().zip(centres).for_each(|(value, centre)| *value *= (1.0 - centre).abs());

@@ -9,7 +9,7 @@ use crate::carried::CarrySummary;
 use crate::error::{Error, Result};
 use crate::frame::ProcessedFrame;
 use crate::stages::{Limits, Stages};
-use crate::work::complex::restored;
+use crate::work::complex::demodulated;
 use crate::work::counts::Counts;
 #[cfg(feature = "tracking")]
 use crate::work::pose::Pose;
@@ -168,17 +168,18 @@ impl Processor {
         if self.last_s.is_some_and(|before_s| exposure.timestamp_s - before_s > self.limits.longest_gap_s) {
             self.counts.restart();
         }
-        restored(&raw, &mut self.calibration, self.limits.most_missing, &mut self.complex)?;
+        demodulated(&raw, &mut self.calibration, self.limits.most_missing, &mut self.complex)?;
         let calibration = &self.calibration;
         let rules = Rules {
             rays: &calibration.rays,
+            restorer: calibration.scattering.as_ref().map(|scattering| &scattering.restorer),
             corrections: ready.map(|index| calibration.corrections(index)),
             span: calibration.span,
             all_outside: calibration.too_warm_or_cold(exposure),
             minimum_confidence: self.stages.unwrap.minimum_confidence,
             width,
         };
-        self.counts.finish(&self.complex, &rules, &mut self.frame)?;
+        self.counts.finish(&mut self.complex, &rules, &mut self.frame)?;
         self.frame.number = self.processed;
         self.processed += 1;
         self.frame.timestamp_s = exposure.timestamp_s;

@@ -1,13 +1,14 @@
-//! From samples to complex images without scattered light.
+//! From samples to complex images, and the light that was scattered into them.
 
 use range_image::{ComplexFrame, Flags, RawView};
 use rayon::prelude::*;
+use scattering_deconvolution::OutsideLightDetector;
 
-use crate::calibration::PreparedCalibration;
+use crate::calibration::{PreparedCalibration, Scattering};
 use crate::error::{Error, Result};
 
-/// Demodulates samples and takes scattered light off.
-pub(crate) fn restored(
+/// Demodulates samples and finds scattered light, which is to be taken off row by row.
+pub(crate) fn demodulated(
     raw: &RawView<'_>,
     calibration: &mut PreparedCalibration,
     most_missing: f64,
@@ -18,13 +19,17 @@ pub(crate) fn restored(
     if missing as f64 > most_missing * pixels as f64 || missing == pixels {
         return Err(Error::Missing { missing, pixels, most: most_missing });
     }
-    if let Some(scattering) = &mut calibration.scattering {
-        scattering.restorer.restore_frame_with(complex, |_| ())?;
-        if let Some(detector) = &scattering.outside {
-            for channel in &complex.channels {
-                detector.detect(channel, &mut complex.flags)?;
-            }
-        }
+    let Some(Scattering { restorer, outside }) = &mut calibration.scattering else { return Ok(()) };
+    let may_detect = |detector: &&OutsideLightDetector| {
+        complex.channels.iter().any(|channel| detector.may_detect(channel, &complex.flags))
+    };
+    // Light from outside is sought in whole images.
+    let Some(detector) = outside.as_ref().filter(may_detect) else {
+        return Ok(restorer.find_in_frame(complex, |_| ())?);
+    };
+    restorer.restore_frame_with(complex, |_| ())?;
+    for channel in &complex.channels {
+        detector.detect(channel, &mut complex.flags)?;
     }
     Ok(())
 }

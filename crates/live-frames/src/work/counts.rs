@@ -45,7 +45,7 @@ impl Counts {
     /// Takes a frame to corrected points.
     pub(crate) fn finish(
         &mut self,
-        complex: &ComplexFrame,
+        complex: &mut ComplexFrame,
         rules: &Rules<'_>,
         frame: &mut ProcessedFrame,
     ) -> Result<()> {

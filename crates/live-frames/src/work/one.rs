@@ -1,6 +1,7 @@
 //! One frequency: counts carried from frame to frame, then corrected points row by row.
 
-use range_image::{ComplexFrame, Raster};
+use range_image::{ComplexChannel, ComplexFrame, ComplexPixels, PolarPixels, Raster};
+use scattering_deconvolution::ChannelRow;
 use statistics::quantile;
 
 use crate::calibration::PreparedCalibration;
@@ -33,14 +34,13 @@ impl One {
 
     pub(crate) fn finish(
         &mut self,
-        complex: &ComplexFrame,
+        complex: &mut ComplexFrame,
         rules: &Rules<'_>,
         frame: &mut ProcessedFrame,
     ) -> Result<CarrySummary> {
-        let Some(channel) = complex.channels.first() else { return Ok(CarrySummary::default()) };
-        let unit = channel.modulation.range_from_phase(1.0) as f32;
         let Self { phase, unwrapper, noise } = self;
-        channel.phase_amplitude_and_sigma_into(phase, &mut frame.amplitude, &mut frame.sigma, unit)?;
+        let Some(channel) = complex.channels.first_mut() else { return Ok(CarrySummary::default()) };
+        to_polar(channel, rules, phase, frame)?;
         let summary = unwrapper.unwrap_next(channel, phase, &frame.amplitude, || median(&channel.sigma, noise))?;
         let (wraps, confidence) = (unwrapper.wraps().as_slice(), unwrapper.confidence().as_slice());
         let (width, rows) = (rules.width, frame.height().div_ceil(MOST_CHUNKS));
@@ -67,6 +67,37 @@ impl One {
         })?;
         Ok(summary)
     }
+}
+
+/// Takes scattered light off, and derives what unwrapping and correction work on.
+fn to_polar(
+    channel: &mut ComplexChannel,
+    rules: &Rules<'_>,
+    phase: &mut Raster<f32>,
+    frame: &mut ProcessedFrame,
+) -> Result<()> {
+    let (width, rows) = (rules.width, frame.height().div_ceil(MOST_CHUNKS));
+    let unit = channel.modulation.range_from_phase(1.0) as f32;
+    let ComplexChannel { real, imaginary, sigma: noise, .. } = channel;
+    let [real, imaginary, noise, phase] =
+        [real, imaginary, noise, phase].map(|plane| plane.as_mut_slice().chunks_mut(rows * width));
+    let planes = real.zip(imaginary).zip(noise.zip(phase));
+    for_each_chunk(frame, rows, planes, |chunk, ((real, imaginary), (noise, phase))| {
+        for (row, start) in (chunk.first_row..).zip((0..phase.len()).step_by(width)) {
+            let own = start..start + width;
+            let (real, imaginary) = (&mut real[own.clone()], &mut imaginary[own.clone()]);
+            let sigma = &mut noise[own.clone()];
+            let pixels = ChannelRow { real: &mut *real, imaginary: &mut *imaginary, sigma: &mut *sigma };
+            rules.take_off_row([row, 0], pixels);
+            let out = PolarPixels {
+                phase: &mut phase[own.clone()],
+                amplitude: &mut chunk.amplitude[own.clone()],
+                sigma: &mut chunk.sigma[own],
+            };
+            ComplexPixels { real, imaginary, sigma }.phase_amplitude_and_sigma_into(out, unit)?;
+        }
+        Ok(())
+    })
 }
 
 /// Noise of each part of the complex image: the median over the pixels; `None` where it is not known.

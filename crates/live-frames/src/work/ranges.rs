@@ -6,12 +6,15 @@ use camera_model::RayTable;
 use error_models::{FrameRows, PreparedCorrection};
 use range_image::{Flags, Modulation, with_wide_registers};
 use range_io::calibration::ValidSpan;
+use scattering_deconvolution::{ChannelRow, Restorer};
 
 use crate::error::Result;
 
 /// What all rows are worked on with.
 pub(crate) struct Rules<'a> {
     pub(crate) rays: &'a RayTable,
+    /// Takes off the scattered light that was found.
+    pub(crate) restorer: Option<&'a Restorer>,
     /// One a frequency; none where nothing is to be corrected.
     pub(crate) corrections: Option<&'a [PreparedCorrection]>,
     pub(crate) span: ValidSpan,
@@ -19,6 +22,15 @@ pub(crate) struct Rules<'a> {
     pub(crate) all_outside: bool,
     pub(crate) minimum_confidence: f64,
     pub(crate) width: usize,
+}
+
+impl Rules<'_> {
+    /// Takes scattered light off a row of the channel at an index.
+    pub(crate) fn take_off_row(&self, [row, index]: [usize; 2], pixels: ChannelRow<'_>) {
+        if let Some(restorer) = self.restorer {
+            restorer.take_off_row(index, row, pixels);
+        }
+    }
 }
 
 /// One frequency in a row.

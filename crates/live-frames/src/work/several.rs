@@ -4,10 +4,10 @@
 #![allow(clippy::inline_always)]
 
 use phase_unwrap::{
-    ChosenRow, CombinedPixels, MultiFrequencyOptions, MultiUnwrapper, PhaseRow, RowWindow, combine_pixels,
-    combined_interval_m,
+    CombinedPixels, MultiFrequencyOptions, MultiUnwrapper, PhaseRow, RowWindow, combine_pixels, combined_interval_m,
 };
-use range_image::{ComplexChannel, ComplexFrame, Flags, PolarPixels, with_wide_registers};
+use range_image::{ComplexChannel, ComplexFrame, ComplexPixels, Flags, PolarPixels, with_wide_registers};
+use scattering_deconvolution::ChannelRow;
 
 use crate::calibration::FURTHEST_M;
 use crate::camera::{LiveCamera, MOST_FREQUENCIES};
@@ -37,6 +37,8 @@ pub(crate) struct Several {
 #[derive(Debug, Clone)]
 struct Part {
     window: RowWindow,
+    /// Parts and deviations of the row that is taken.
+    complex: [Vec<f32>; 3],
     /// Rows whose neighbours are not known yet, each in the place of its number's rest.
     waiting: Vec<Vec<Polar>>,
     /// Standard deviations of the phases by noise and by errors that are not taken off yet.
@@ -93,6 +95,7 @@ impl Part {
         let polar = Polar { phase: row.clone(), amplitude: row.clone(), sigma: row.clone() };
         Self {
             window: RowWindow::default(),
+            complex: [row.clone(), row.clone(), row.clone()],
             waiting: vec![vec![polar; frequencies]; reach + 1],
             noise: rows.clone(),
             mask: vec![false; width],
@@ -117,7 +120,7 @@ impl Part {
         unwrapper.begin_rows(rules.width, &mut self.window);
         for step in 0..rows + 2 * reach {
             match (first + step).checked_sub(reach).filter(|row| *row < height) {
-                Some(row) => self.take(row, unwrapper, complex)?,
+                Some(row) => self.take(row, unwrapper, complex, rules)?,
                 None => unwrapper.take_empty_row(&mut self.window),
             }
             if let Some(row) = step.checked_sub(2 * reach) {
@@ -128,7 +131,13 @@ impl Part {
     }
 
     /// Phases of a row, and what ranges they allow.
-    fn take(&mut self, row: usize, unwrapper: &MultiUnwrapper, complex: &ComplexFrame) -> Result<()> {
+    fn take(
+        &mut self,
+        row: usize,
+        unwrapper: &MultiUnwrapper,
+        complex: &ComplexFrame,
+        rules: &Rules<'_>,
+    ) -> Result<()> {
         let width = self.mask.len();
         let place = row % self.waiting.len();
         let waiting = &mut self.waiting[place];
@@ -136,8 +145,13 @@ impl Part {
         let planes = complex.channels.iter().zip(waiting).zip(&mut self.noise);
         let mut count = 0;
         for ((channel, Polar { phase, amplitude, sigma }), noise) in planes {
+            for (to, plane) in self.complex.iter_mut().zip([&channel.real, &channel.imaginary, &channel.sigma]) {
+                to.copy_from_slice(&plane.as_slice()[row * width..(row + 1) * width]);
+            }
+            let [real, imaginary, given] = &mut self.complex;
+            rules.take_off_row([row, count], ChannelRow { real, imaginary, sigma: given });
             let out = PolarPixels { phase, amplitude, sigma };
-            channel.phase_amplitude_and_sigma_of(row * width, out, 1.0)?;
+            ComplexPixels { real, imaginary, sigma: given }.phase_amplitude_and_sigma_into(out, 1.0)?;
             add_systematics(channel, sigma, noise);
             (phases[count], sigmas[count]) = (phase, noise);
             count += 1;
@@ -162,7 +176,7 @@ impl Part {
         let first = number * rules.width;
         let Self { window, waiting, chosen, confidence, wraps, ranges, sigmas, chi_squared, .. } = self;
         let waiting = &waiting[number % waiting.len()];
-        unwrapper.choose_row(window, ChosenRow { range: chosen, confidence })?;
+        unwrapper.choose_row(window, chosen, confidence)?;
         let flags = &mut chunk.flags[at.clone()];
         let given = &complex.flags.as_slice()[first..first + rules.width];
         flag_unsure(given, confidence, rules.minimum_confidence, flags);
@@ -188,16 +202,14 @@ impl Part {
     }
 }
 
-/// The hypotenuse of the noise and of range errors; not known where the noise is not.
+/// The hypotenuse of the noise and of range errors, to the last bit but one; not known where the noise is not.
 fn add_systematics(channel: &ComplexChannel, sigma: &[f32], out: &mut [f32]) {
-    let systematic = f64::from(channel.modulation.phase_from_range(SYSTEMATIC_M) as f32);
+    let systematic = channel.modulation.phase_from_range(SYSTEMATIC_M) as f32;
     with_wide_registers(
         #[inline(always)]
         || {
             for (out, sigma) in out.iter_mut().zip(sigma) {
-                // Squares of single precision are exact in double: the bits of `f32::hypot`, many at once.
-                let sigma = f64::from(*sigma);
-                *out = (sigma * sigma + systematic * systematic).sqrt() as f32;
+                *out = (sigma * sigma + systematic * systematic).sqrt();
             }
         },
     );

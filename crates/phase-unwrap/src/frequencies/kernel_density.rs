@@ -157,6 +157,9 @@ impl RowWindow {
         let at = self.layout.radius + col;
         let range_m: [Lanes; RANKS] = std::array::from_fn(|rank| self.layout.line(own, rank, at));
         let mut weight: [Lanes; RANKS] = std::array::from_fn(|rank| self.layout.line(own, RANKS + rank, at));
+        if is_alone(&weight) {
+            return Chosen { range_m: range_m[0], confidence: self.layout.line(own, FIT_LINE, at) };
+        }
         if !self.neighbours.is_empty() && !Self::settled(&weight) {
             let density = self.density(col, &range_m, &self.layout.line(own, WIDTH_LINE, at));
             let background = Self::background_of(&density);
@@ -247,13 +250,29 @@ impl Layout {
         let mut put = |line: usize, lanes: &Lanes| {
             row[line * self.padded + self.radius + col..][..LANES].copy_from_slice(lanes);
         };
-        for rank in 0..RANKS {
+        // Ranges without probability are not looked at.
+        for rank in 0..if found.alone { 1 } else { RANKS } {
             put(rank, &found.range_m[rank]);
+        }
+        for rank in 0..RANKS {
             put(RANKS + rank, &found.probability[rank]);
         }
         put(WIDTH_LINE, &inverse);
         put(FIT_LINE, &found.acceptable);
     }
+}
+
+/// Whether each pixel has one hypothesis and no other.
+#[inline(always)]
+fn is_alone<const K: usize>(probability: &[Lanes; K]) -> bool {
+    let mut off = 0;
+    for (rank, probability) in probability.iter().enumerate() {
+        let expected = if rank == 0 { 1.0_f32 } else { 0.0 };
+        for probability in probability {
+            off |= probability.to_bits() ^ expected.to_bits();
+        }
+    }
+    off == 0
 }
 
 /// The hypothesis with the greatest weight; its confidence is `2p - 1` with its share p of all weights.

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use crate::frequencies::frame::Planes;
 use crate::frequencies::kernel_density::{KernelDensityOptions, RowWindow};
 use crate::frequencies::lattice::Lattice;
-use crate::frequencies::rows::ChosenRow;
 use crate::tree::cycle::all_into_cycle;
 use crate::{Error, Result};
 
@@ -183,8 +182,7 @@ impl MultiUnwrapper {
                 }
                 if let Some(row) = step.checked_sub(2 * reach) {
                     let at = row * width..(row + 1) * width;
-                    let (range, confidence) = (&mut range[at.clone()], &mut confidence[at]);
-                    self.choose_row(window, ChosenRow { range, confidence })?;
+                    self.choose_row(window, &mut range[at.clone()], &mut confidence[at])?;
                 }
             }
             Ok(())

@@ -9,8 +9,11 @@ use range_image::with_wide_registers;
 
 use crate::frequencies::frame::Planes;
 use crate::frequencies::kernel_density::{RANKS, RowWindow};
-use crate::frequencies::lanes::{LANES, nearest, scatter};
+use crate::frequencies::lanes::{LANES, ROUNDER, scatter};
 use crate::{MultiUnwrapper, Result};
+
+/// More whole cycles between phase and range are no count: single-precision phases say nothing there.
+const MOST_CYCLES: f32 = 2_097_152.0;
 
 /// A row of a frame: one slice a frequency, in the order of the modulations.
 #[derive(Debug, Clone, Copy)]
@@ -21,15 +24,6 @@ pub struct PhaseRow<'a> {
     pub sigmas: &'a [&'a [f32]],
     /// Pixels that are used.
     pub mask: &'a [bool],
-}
-
-/// The choice among the hypotheses of a row of pixels.
-#[derive(Debug)]
-pub struct ChosenRow<'a> {
-    /// As [`MultiUnwrapped::range`](crate::MultiUnwrapped::range).
-    pub range: &'a mut [f32],
-    /// As [`MultiUnwrapped::confidence`](crate::MultiUnwrapped::confidence).
-    pub confidence: &'a mut [f32],
 }
 
 /// Rows one after the other give what [`MultiUnwrapper::unwrap`] does, to the bit. Into a window of its own, each part of a frame
@@ -72,7 +66,7 @@ impl MultiUnwrapper {
             || {
                 for col in (0..width).step_by(LANES) {
                     let count = LANES.min(width - col);
-                    let found = lattice.search::<RANKS>(planes, first + col, count);
+                    let found = lattice.search::<RANKS>(planes, first + col, count, false);
                     layout.store(lines, col, &found);
                     if !sigma.is_empty() {
                         scatter(sigma, col, count, &found.known_sigma_m);
@@ -82,12 +76,12 @@ impl MultiUnwrapper {
         );
     }
 
-    /// Chooses the ranges of the row in the middle of those taken last.
+    /// Chooses the ranges of the row in the middle of those taken last, with their confidences.
     ///
     /// # Errors
     /// [`Error::Raster`](crate::Error::Raster) for slices that are not one row.
-    pub fn choose_row(&self, window: &RowWindow, row: ChosenRow<'_>) -> Result<()> {
-        let (width, ChosenRow { range, confidence }) = (window.width(), row);
+    pub fn choose_row(&self, window: &RowWindow, range: &mut [f32], confidence: &mut [f32]) -> Result<()> {
+        let width = window.width();
         if let Some(found) = [range.len(), confidence.len()].into_iter().find(|found| *found != width) {
             return Err(range_image::Error::RasterLength { width, height: 1, expected: width, found }.into());
         }
@@ -114,7 +108,9 @@ impl MultiUnwrapper {
             || {
                 for ((wraps, range), phase) in wraps.iter_mut().zip(ranges).zip(phases) {
                     let cycles = range * rate - phase * (1.0 / TAU);
-                    *wraps = if cycles.is_finite() { nearest(cycles) as i32 } else { 0 };
+                    // The last bits of the sum are the number itself.
+                    let count = (cycles + ROUNDER).to_bits().wrapping_sub(ROUNDER.to_bits()) as i32;
+                    *wraps = if cycles.abs() < MOST_CYCLES { count } else { 0 };
                 }
             },
         );

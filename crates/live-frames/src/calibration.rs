@@ -75,7 +75,7 @@ impl PreparedCalibration {
         }
         Ok(Self {
             rays: RayTable::new(&camera)?,
-            demodulator: Demodulator::new(&demodulation)?,
+            demodulator: Demodulator::new(&demodulation)?.without_offset(),
             scattering: scattering(live, calibration, stages)?,
             geometry: image_geometry(&camera),
             span: calibration.span,

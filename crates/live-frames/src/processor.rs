@@ -1,6 +1,6 @@
 //! The object that a camera's callback calls.
 
-use range_image::{RawView, SampleSlice};
+use range_image::{ComplexFrame, RawView, SampleSlice};
 use range_io::calibration::Calibration;
 
 use crate::calibration::PreparedCalibration;
@@ -9,11 +9,11 @@ use crate::carried::CarrySummary;
 use crate::error::{Error, Result};
 use crate::frame::ProcessedFrame;
 use crate::stages::{Limits, Stages};
+use crate::work::complex::demodulated;
 use crate::work::counts::Counts;
-use crate::work::planes::Planes;
 #[cfg(feature = "tracking")]
 use crate::work::pose::Pose;
-use crate::work::rows::{Frequencies, Rules, finish};
+use crate::work::ranges::Rules;
 
 /// Takes the frames of one camera from samples to corrected points, one call a frame.
 ///
@@ -24,9 +24,8 @@ pub struct Processor {
     stages: Stages,
     limits: Limits,
     calibration: PreparedCalibration,
-    planes: Planes,
+    complex: ComplexFrame,
     counts: Counts,
-    frequencies: Frequencies,
     frame: ProcessedFrame,
     last_s: Option<f64>,
     processed: u64,
@@ -49,12 +48,10 @@ impl Processor {
         limits.validate()?;
         stages.unwrap.validate()?;
         let camera = calibration.live_camera().clone();
-        let (width, height, frequencies) = (camera.width, camera.height, camera.modulations.len());
         Ok(Self {
-            planes: Planes::new(&camera),
-            counts: Counts::new(&camera, &calibration, &stages.unwrap)?,
-            frequencies: Frequencies::new(width, height, frequencies),
-            frame: ProcessedFrame::new(width, height),
+            complex: ComplexFrame::empty(),
+            counts: Counts::new(&calibration, &stages.unwrap)?,
+            frame: ProcessedFrame::new(camera.width, camera.height),
             last_s: None,
             processed: 0,
             #[cfg(feature = "tracking")]
@@ -171,19 +168,18 @@ impl Processor {
         if self.last_s.is_some_and(|before_s| exposure.timestamp_s - before_s > self.limits.longest_gap_s) {
             self.counts.restart();
         }
-        let most_missing = self.limits.most_missing;
-        self.planes.fill(&raw, &mut self.calibration, most_missing, &mut self.frame)?;
-        self.frame.counts = self.counts.find(&self.planes, &self.frame)?;
+        demodulated(&raw, &mut self.calibration, self.limits.most_missing, &mut self.complex)?;
         let calibration = &self.calibration;
         let rules = Rules {
             rays: &calibration.rays,
+            restorer: calibration.scattering.as_ref().map(|scattering| &scattering.restorer),
             corrections: ready.map(|index| calibration.corrections(index)),
             span: calibration.span,
             all_outside: calibration.too_warm_or_cold(exposure),
             minimum_confidence: self.stages.unwrap.minimum_confidence,
             width,
         };
-        finish(&rules, &self.planes, self.counts.found(), &mut self.frequencies, &mut self.frame)?;
+        self.counts.finish(&mut self.complex, &rules, &mut self.frame)?;
         self.frame.number = self.processed;
         self.processed += 1;
         self.frame.timestamp_s = exposure.timestamp_s;

@@ -27,8 +27,9 @@ pub use frequencies::combine::{Combined, CombinedPixels, combine_frequencies, co
 pub use frequencies::fold::Fold;
 pub use frequencies::hypotheses::{Hypotheses, Hypothesis, RankedHypotheses, hypotheses};
 pub use frequencies::intervals::combined_interval_m;
-pub use frequencies::kernel_density::KernelDensityOptions;
+pub use frequencies::kernel_density::{KernelDensityOptions, RowWindow};
 pub use frequencies::multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, unwrap_multi_frequency};
+pub use frequencies::rows::PhaseRow;
 pub use range_image;
 pub use tree::grid::{wrap_step, wrapped};
 pub use tree::options::{AlbedoPrior, Boundary, EdgeWeight, ImageGeometry, KnownWraps, Seed, SpatialOptions};

@@ -3,8 +3,8 @@
 use crate::frequencies;
 use crate::frequencies::{Frame, SETS, SIGMAS, Scene, modulations};
 use phase_unwrap::{
-    Error, KernelDensityOptions, MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, combined_interval_m,
-    hypotheses, unwrap_multi_frequency,
+    Error, KernelDensityOptions, MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, PhaseRow, RowWindow,
+    combined_interval_m, hypotheses, unwrap_multi_frequency,
 };
 use range_image::Raster;
 
@@ -131,6 +131,52 @@ fn threads_buffers_and_blocks_leave_no_trace() {
         Frame { phases: frame.phases.iter().map(column).collect(), sigmas: frame.sigmas.iter().map(column).collect() };
     let (alone, line) = (unwrap(&scene, &frame, None), unwrap(&scene, &upright, None));
     assert_eq!((alone.range.as_slice(), alone.wraps[1].as_slice()), (line.range.as_slice(), line.wraps[1].as_slice()));
+}
+
+#[test]
+fn rows_have_the_bits_of_the_frame() {
+    let scene = Scene::furnished(53, 20, SETS[2].1, 11);
+    let (frame, width, height) = (scene.capture(0.6, 12), 53, 20);
+    let mask = Raster::from_fn(width, height, |col, row| (col + row) % 11 != 0);
+    for kernel in [None, Some(KernelDensityOptions::default()), Some(KernelDensityOptions { radius: 2 })] {
+        let options = MultiFrequencyOptions { kernel, ..MultiFrequencyOptions::default() };
+        let mut unwrapper = MultiUnwrapper::new(&scene.modulations, options).unwrap();
+        let expected = unwrapper.unwrap(&frame.phases, Some(&frame.sigmas), Some(&mask)).unwrap();
+        let (mut window, reach) = (RowWindow::default(), unwrapper.reach());
+        // From the middle of the image to its end.
+        let first = 7;
+        unwrapper.begin_rows(width, &mut window);
+        let (mut range, mut confidence, mut wraps) = (vec![0.0; width], vec![0.0; width], vec![0; width]);
+        for row in first - reach..height + reach {
+            let at = row * width..(row + 1) * width;
+            if row < height {
+                let of_row = |plane: &Raster<f32>| plane.as_slice()[at.clone()].to_vec();
+                let (phases, sigmas): (Vec<_>, Vec<_>) =
+                    frame.phases.iter().zip(&frame.sigmas).map(|(phase, sigma)| (of_row(phase), of_row(sigma))).unzip();
+                let (phases, sigmas): (Vec<_>, Vec<_>) =
+                    (phases.iter().map(Vec::as_slice).collect(), sigmas.iter().map(Vec::as_slice).collect());
+                let mask = &mask.as_slice()[at];
+                let short = PhaseRow { phases: &phases, sigmas: &sigmas, mask: &mask[1..] };
+                assert!(matches!(unwrapper.take_row(&short, &mut window), Err(Error::Raster(_))));
+                let few = PhaseRow { phases: &phases, sigmas: &sigmas[1..], mask };
+                assert!(matches!(unwrapper.take_row(&few, &mut window), Err(Error::PlaneCount { .. })));
+                unwrapper.take_row(&PhaseRow { phases: &phases, sigmas: &sigmas, mask }, &mut window).unwrap();
+            } else {
+                unwrapper.take_empty_row(&mut window);
+            }
+            let Some(row) = row.checked_sub(reach).filter(|row| *row >= first) else { continue };
+            let at = row * width..(row + 1) * width;
+            assert!(unwrapper.choose_row(&window, &mut range[1..], &mut confidence).is_err());
+            unwrapper.choose_row(&window, &mut range, &mut confidence).unwrap();
+            let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&range), bits(&expected.range.as_slice()[at.clone()]), "row {row}");
+            assert_eq!(bits(&confidence), bits(&expected.confidence.as_slice()[at.clone()]), "row {row}");
+            for frequency in 0..frame.phases.len() {
+                unwrapper.count_wraps(frequency, &range, &frame.phases[frequency].as_slice()[at.clone()], &mut wraps);
+                assert_eq!(wraps, expected.wraps[frequency].as_slice()[at.clone()]);
+            }
+        }
+    }
 }
 
 #[test]

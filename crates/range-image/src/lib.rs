@@ -16,7 +16,7 @@ pub use demodulation::polar_level::PolarChannel;
 pub use demodulation::wide_registers::with_wide_registers;
 pub use error::Error;
 use error::Result;
-pub use rasters::channel::ComplexChannel;
+pub use rasters::channel::{ComplexChannel, ComplexPixels, PolarPixels};
 pub use rasters::flags::Flags;
 pub use rasters::frame::{ComplexFrame, RangeFrame, RawFrame, RawView, SampleSlice, Samples};
 pub use rasters::image_format::ImageFormat;

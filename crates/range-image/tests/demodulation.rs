@@ -6,8 +6,8 @@ use crate::common::{Truth, angle_between, frame_f32, modulations, samples};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use range_image::{
-    ComplexFrame, DemodulationOptions, Demodulator, Error, Flags, PhaseSense, RawFrame, RawView, SampleSlice, Samples,
-    demodulate,
+    ComplexFrame, DemodulationOptions, Demodulator, Error, Flags, Modulation, PhaseSense, Raster, RawFrame, RawView,
+    SampleSlice, Samples, demodulate,
 };
 
 fn row(pixels: usize, shift: f64) -> Vec<Truth> {
@@ -199,6 +199,25 @@ fn a_demodulator_reuses_its_frame() {
     out.channels[0].offset = None;
     demodulator.demodulate_into(&smaller, &mut out).unwrap();
     assert_eq!(out, whole);
+}
+
+#[test]
+fn without_an_offset_all_else_is_the_same() {
+    let modulations = vec![Modulation::new(20e6).unwrap(), Modulation::new(30e6).unwrap()];
+    let samples =
+        (0..4 * 2 * 70).map(|sample| if sample == 75 { f32::NAN } else { (sample * 37 % 101) as f32 }).collect();
+    let raw = RawFrame::new(70, 1, 4, modulations, Samples::F32(samples)).unwrap();
+    let demodulator = Demodulator::new(&DemodulationOptions::default()).unwrap();
+    let (mut with, mut without) = (ComplexFrame::empty(), ComplexFrame::empty());
+    demodulator.demodulate_into(&raw, &mut with).unwrap();
+    demodulator.without_offset().demodulate_into(&raw, &mut without).unwrap();
+    assert!(with.channels.iter().all(|channel| channel.offset.is_some()));
+    assert!(without.channels.iter().all(|channel| channel.offset.is_none()));
+    let bits = |plane: &Raster<f32>| plane.as_slice().iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+    for (a, b) in with.channels.iter().zip(&without.channels) {
+        assert_eq!([&a.real, &a.imaginary, &a.sigma].map(bits), [&b.real, &b.imaginary, &b.sigma].map(bits));
+    }
+    assert_eq!(with.flags, without.flags);
 }
 
 #[test]

@@ -25,6 +25,7 @@ pub use outside::{DarkPixels, OutsideLight, OutsideLightDetector, OutsideLightOp
 pub use range_image;
 pub use restoration::frame::restore;
 pub use restoration::restorer::{RestorationSummary, Restorer};
+pub use restoration::rows::ChannelRow;
 pub use restoration::scatterer::Scatterer;
 pub use spread::composite::{CompositePsf, FieldTerm, Ghost, GhostDelay, GhostPlace};
 pub use spread::field::FieldPolynomial;

@@ -3,8 +3,10 @@
 use crate::common::{channel, frame, gaussians, range_errors, rough_kernel, scene};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use range_image::ComplexFrame;
-use scattering_deconvolution::{GridSpacing, Psf, Refinement, RestorationOptions, Restorer, Scatterer, restore};
+use range_image::{ComplexFrame, Flags};
+use scattering_deconvolution::{
+    ChannelRow, GridSpacing, Psf, Refinement, RestorationOptions, Restorer, Scatterer, restore,
+};
 
 fn every_pixel() -> RestorationOptions {
     RestorationOptions { grid_spacing: GridSpacing::EveryPixel, ..RestorationOptions::default() }
@@ -167,6 +169,47 @@ fn a_restorer_forgets_the_image_before() {
     restorer.restore(&mut other).unwrap();
     restorer.restore_frame(&mut again).unwrap();
     assert_eq!(first, again);
+}
+
+#[test]
+fn rows_are_restored_to_the_bits_of_whole_frames() {
+    let (width, height) = (88, 72);
+    let (range, amplitude) = scene(width, height);
+    for (psf, options, saturated) in [
+        (gaussians(&[(0.06, 12.0, 12.0)]), RestorationOptions::default(), false),
+        (gaussians(&[(0.06, 12.0, 12.0)]), every_pixel(), false),
+        // What is put aside has the whole channel restored at once.
+        (gaussians(&[(0.06, 12.0, 12.0)]), RestorationOptions::default(), true),
+        // Noise of other pixels counts beside that of the own.
+        (gaussians(&[(0.3, 0.7, 0.7)]), RestorationOptions::default(), false),
+    ] {
+        let mut seen = frame(&range, &amplitude);
+        scatter(&psf, &mut seen);
+        seen.channels[0].sigma.as_mut_slice().fill(2.0);
+        let mut second = seen.channels[0].clone();
+        second.real.as_mut_slice().iter_mut().for_each(|value| *value *= 0.5);
+        seen.channels.push(second);
+        if saturated {
+            seen.flags.as_mut_slice()[40 * width + 30] |= Flags::SATURATED;
+        }
+        let mut whole = seen.clone();
+        let mut restorer = Restorer::new(&psf, width, height, &options).unwrap();
+        restorer.restore_frame(&mut whole).unwrap();
+        // The second time with what the first one left.
+        for _ in 0..2 {
+            let mut by_rows = seen.clone();
+            restorer.find_in_frame(&mut by_rows, |_| ()).unwrap();
+            assert_eq!(by_rows == whole, saturated, "rows are left to be restored");
+            for (index, channel) in by_rows.channels.iter_mut().enumerate() {
+                for row in (0..height).rev() {
+                    let [real, imaginary, sigma] = [&mut channel.real, &mut channel.imaginary, &mut channel.sigma]
+                        .map(|plane| &mut plane.as_mut_slice()[row * width..(row + 1) * width]);
+                    restorer.take_off_row(index, row, ChannelRow { real, imaginary, sigma });
+                }
+            }
+            assert!(by_rows == whole, "{psf:?} {saturated}");
+        }
+    }
 }
 
 proptest! {

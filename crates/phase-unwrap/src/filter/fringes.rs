@@ -5,8 +5,8 @@
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
+use crate::filter::phasor::{angle, unit};
 use crate::filter::window::{LANES, Planes, lanes};
-use crate::frequencies::phasor::{angle, unit};
 
 /// Side of a tile in pixels: one slope serves it. A surface whose slope grows by 0.02 rad a pixel from pixel to pixel is
 /// off by 0.16 rad a pixel at the tile's edge, which takes a tenth of the mean of the largest window; twice the side

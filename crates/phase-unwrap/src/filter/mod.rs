@@ -3,5 +3,6 @@
 pub(crate) mod congruent;
 pub(crate) mod fringes;
 pub(crate) mod noise;
+pub(crate) mod phasor;
 pub(crate) mod prefilter;
 pub(crate) mod window;

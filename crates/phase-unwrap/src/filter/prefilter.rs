@@ -4,8 +4,8 @@ use range_image::Raster;
 
 use crate::filter::fringes::{TILE, Tile};
 use crate::filter::noise::{PhaseNoise, estimate, weight};
+use crate::filter::phasor::unit;
 use crate::filter::window::{Limits, Planes, RowOut, Windows};
-use crate::frequencies::phasor::unit;
 use crate::tree::cycle::into_cycle;
 use crate::{Error, Result};
 

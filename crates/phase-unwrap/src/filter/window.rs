@@ -9,7 +9,7 @@ use std::f32::consts::{PI, TAU};
 use crate::PrefilterOptions;
 use crate::filter::fringes::Tile;
 use crate::filter::noise::weight;
-use crate::frequencies::phasor::angle;
+use crate::filter::phasor::angle;
 
 /// Pixels that go side by side through the registers.
 pub(crate) const LANES: usize = 8;

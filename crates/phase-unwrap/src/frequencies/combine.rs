@@ -1,9 +1,10 @@
 //! Ranges of several frequencies brought together.
 // Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always, clippy::needless_range_loop)]
+#![allow(clippy::inline_always, clippy::needless_range_loop, clippy::needless_bitwise_bool)]
 
 use range_image::{Raster, with_wide_registers};
 
+use crate::frequencies::lanes::LANES;
 use crate::{Error, Result};
 
 /// Ranges of several frequencies combined.
@@ -37,18 +38,9 @@ pub fn combine_frequencies(ranges: &[Raster<f32>], sigmas: &[Raster<f32>]) -> Re
     }
     let plane = || Raster::filled(first.width(), first.height(), f32::NAN);
     let mut out = Combined { range: plane(), sigma: plane(), chi_squared: plane() };
-    let Combined { range, sigma, chi_squared } = &mut out;
-    let mut rows = [range, sigma, chi_squared].map(|plane| plane.as_mut_slice().chunks_mut(first.width().max(1)));
-    let (mut values, mut deviations) = (Vec::with_capacity(ranges.len()), Vec::with_capacity(ranges.len()));
-    for row in 0..first.height() {
-        let [Some(range), Some(sigma), Some(chi_squared)] = rows.each_mut().map(Iterator::next) else { break };
-        let pixels = row * first.width()..(row + 1) * first.width();
-        values.clear();
-        values.extend(ranges.iter().map(|plane| &plane.as_slice()[pixels.clone()]));
-        deviations.clear();
-        deviations.extend(sigmas.iter().map(|plane| &plane.as_slice()[pixels.clone()]));
-        combine_pixels(&values, &deviations, CombinedPixels { range, sigma, chi_squared })?;
-    }
+    let [values, deviations] = [ranges, sigmas].map(|planes| planes.iter().map(Raster::as_slice).collect::<Vec<_>>());
+    let [range, sigma, chi_squared] = [&mut out.range, &mut out.sigma, &mut out.chi_squared].map(Raster::as_mut_slice);
+    combine_pixels(&values, &deviations, CombinedPixels { range, sigma, chi_squared })?;
     Ok(out)
 }
 
@@ -75,78 +67,76 @@ pub fn combine_pixels(ranges: &[&[f32]], sigmas: &[&[f32]], out: CombinedPixels<
         let (width, height, expected) = (count, 1, count);
         return Err(range_image::Error::RasterLength { width, height, expected, found }.into());
     }
-    // Of up to four frequencies the compiler knows the number and takes many pixels at once.
-    match ranges.len() {
-        0 => return Err(Error::TooFewFrequencies { found: 0 }),
-        1 => combine_known::<1>(ranges, sigmas, out),
-        2 => combine_known::<2>(ranges, sigmas, out),
-        3 => combine_known::<3>(ranges, sigmas, out),
-        4 => combine_known::<4>(ranges, sigmas, out),
-        _ => {
-            for pixel in 0..count {
-                let at = |planes: &[&[f32]], frequency: usize| f64::from(planes[frequency][pixel]);
-                let values = (0..ranges.len()).map(|frequency| (at(ranges, frequency), at(sigmas, frequency)));
-                let [range, sigma, chi_squared] = combine_pixel(values);
-                out.range[pixel] = range;
-                out.sigma[pixel] = sigma;
-                out.chi_squared[pixel] = chi_squared;
-            }
-        }
+    if ranges.is_empty() {
+        return Err(Error::TooFewFrequencies { found: 0 });
     }
-    Ok(())
-}
-
-fn combine_known<const F: usize>(ranges: &[&[f32]], sigmas: &[&[f32]], out: CombinedPixels<'_>) {
-    let (Some(ranges), Some(sigmas)) = (ranges.first_chunk::<F>(), sigmas.first_chunk::<F>()) else { return };
-    let count = out.range.len();
-    let (ranges, sigmas) = (ranges.map(|plane| &plane[..count]), sigmas.map(|plane| &plane[..count]));
     let CombinedPixels { range, sigma, chi_squared } = out;
     with_wide_registers(
         #[inline(always)]
         || {
-            let (range, sigma, chi_squared) = (&mut range[..count], &mut sigma[..count], &mut chi_squared[..count]);
-            for pixel in 0..count {
-                let mut values = [(0.0, 0.0); F];
-                for frequency in 0..F {
-                    values[frequency] = (f64::from(ranges[frequency][pixel]), f64::from(sigmas[frequency][pixel]));
-                }
-                [range[pixel], sigma[pixel], chi_squared[pixel]] = combine_pixel(values.iter().copied());
+            let mut out = [&mut *range, &mut *sigma, &mut *chi_squared];
+            let whole = count / LANES * LANES;
+            for start in (0..whole).step_by(LANES) {
+                combine_lanes::<LANES>(ranges, sigmas, start, &mut out);
+            }
+            for start in whole..count {
+                combine_lanes::<1>(ranges, sigmas, start, &mut out);
             }
         },
     );
+    Ok(())
 }
 
-/// Mean, sigma and chi-squared of `(range, sigma)`.
+/// Means, sigmas and chi-squareds of `L` pixels from `start` on. Ranges are taken as differences from the first one, which are as
+/// exact in single precision as the ranges themselves.
 #[inline(always)]
-#[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop around it scalar
-fn combine_pixel(values: impl Iterator<Item = (f64, f64)> + Clone) -> [f32; 3] {
-    let (mut weight, mut weighted, mut known) = (0.0, 0.0, 0.0);
-    let (mut sum, mut count) = (0.0, 0.0);
+fn combine_lanes<const L: usize>(ranges: &[&[f32]], sigmas: &[&[f32]], start: usize, out: &mut [&mut [f32]; 3]) {
     // Compared with infinity, it would become a question for the class of the number, which compilers answer lane by lane.
-    let is_finite = |value: f64| value.abs() <= f64::MAX;
-    let own_weight = |range: f64, sigma: f64| {
+    let is_finite = |value: f32| value.abs() <= f32::MAX;
+    let (mut first, mut weight, mut weighted, mut known) = ([0.0; L], [0.0; L], [0.0; L], [0.0; L]);
+    let (mut sum, mut count) = ([0.0; L], [0.0; L]);
+    let own_weight = |range: f32, sigma: f32| {
         let known = is_finite(range) & is_finite(sigma) & (sigma > 0.0);
         if known { 1.0 / (sigma * sigma) } else { 0.0 }
     };
-    for (range, sigma) in values.clone() {
-        let own = own_weight(range, sigma);
-        weight += own;
-        weighted += if own > 0.0 { range * own } else { 0.0 };
-        known += if own > 0.0 { 1.0 } else { 0.0 };
-        sum += if is_finite(range) { range } else { 0.0 };
-        count += if is_finite(range) { 1.0 } else { 0.0 };
+    let planes = ranges.iter().zip(sigmas);
+    let pixels = planes
+        .filter_map(|(range, sigma)| Some((range[start..].first_chunk::<L>()?, sigma[start..].first_chunk::<L>()?)));
+    for (range, sigma) in pixels.clone() {
+        for lane in 0..L {
+            let (there, own) = (is_finite(range[lane]), own_weight(range[lane], sigma[lane]));
+            first[lane] = if there & (count[lane] < 0.5) { range[lane] } else { first[lane] };
+            let off = if there { range[lane] - first[lane] } else { 0.0 };
+            weight[lane] += own;
+            weighted[lane] += off * own;
+            known[lane] += if own > 0.0 { 1.0 } else { 0.0 };
+            sum[lane] += off;
+            count[lane] += if there { 1.0 } else { 0.0 };
+        }
     }
-    // Subnormal sigmas square to an infinite weight, which is no weight.
-    let weighs = (weight > 0.0) & is_finite(weight);
-    let mean = if weighs { weighted } else { sum } / if weighs { weight } else { count };
-    let mut chi_squared = 0.0;
-    for (range, sigma) in values {
-        let (own, off) = (own_weight(range, sigma), range - mean);
-        chi_squared += if own > 0.0 { off * off * own } else { 0.0 };
+    let (mut shift, mut chi_squared) = ([0.0; L], [0.0; L]);
+    let mut found = [[0.0; L]; 3];
+    for lane in 0..L {
+        // Deviations beyond 1e19 m, or their reciprocals, square to no weight.
+        let weighs = (weight[lane] > 0.0) & is_finite(weight[lane]);
+        let inverse = 1.0 / if weighs { weight[lane] } else { count[lane] };
+        shift[lane] = if weighs { weighted[lane] } else { sum[lane] } * inverse;
+        found[0][lane] = first[lane] + shift[lane];
+        found[1][lane] = if weighs { inverse.sqrt() } else { f32::NAN };
+        found[2][lane] = if weighs & (known[lane] > 1.5) { 0.0 } else { f32::NAN };
     }
-    [
-        mean as f32,
-        if weighs { weight.sqrt().recip() as f32 } else { f32::NAN },
-        if weighs & (known > 1.0) { chi_squared as f32 } else { f32::NAN },
-    ]
+    for (range, sigma) in pixels {
+        for lane in 0..L {
+            let (own, off) = (own_weight(range[lane], sigma[lane]), range[lane] - first[lane] - shift[lane]);
+            chi_squared[lane] += if own > 0.0 { off * off * own } else { 0.0 };
+        }
+    }
+    for lane in 0..L {
+        found[2][lane] += chi_squared[lane];
+    }
+    for (out, found) in out.iter_mut().zip(&found) {
+        if let Some(out) = out[start..].first_chunk_mut() {
+            *out = *found;
+        }
+    }
 }

@@ -7,18 +7,20 @@ use std::f64::consts::TAU;
 use range_image::Raster;
 
 use crate::frequencies::lanes::{LANES, Lanes, gather, select};
-use crate::frequencies::lattice::Lattice;
+use crate::frequencies::lattice::{Lattice, MAXIMUM_FREQUENCIES};
+use crate::frequencies::rows::PhaseRow;
 use crate::{Error, Result};
 
 /// Standard deviations below this, radians, are not believed: they are of the size of a phase's last bit.
 const SMALLEST_SIGMA_RAD: f32 = 1e-5;
 
-/// Planes of one frame, checked.
+/// Planes of one frame, or a row of each, checked.
 #[derive(Clone, Copy)]
 pub(crate) struct Planes<'a> {
-    phases: &'a [Raster<f32>],
-    sigmas: Option<&'a [Raster<f32>]>,
-    mask: Option<&'a Raster<bool>>,
+    phases: [&'a [f32]; MAXIMUM_FREQUENCIES],
+    sigmas: Option<[&'a [f32]; MAXIMUM_FREQUENCIES]>,
+    mask: Option<&'a [bool]>,
+    size: (usize, usize),
 }
 
 /// Phases of a block of pixels, frequencies from the highest.
@@ -41,9 +43,11 @@ impl<const F: usize> Block<F> {
             Self { cycles: [zero; F], weight: [zero; F], total_weight: zero, members: zero, sigma_known: [1.0; LANES] };
         let used = planes.used(start, count);
         for (position, (&frequency, interval_m)) in lattice.order.iter().zip(&lattice.intervals_m).enumerate() {
-            let phase = gather(planes.phases[frequency].as_slice(), start, count);
-            let sigma =
-                planes.sigmas.map_or([f32::NAN; LANES], |sigmas| gather(sigmas[frequency].as_slice(), start, count));
+            let phase = gather(planes.phases[frequency], start, count);
+            let sigma = match &planes.sigmas {
+                Some(sigmas) => gather(sigmas[frequency], start, count),
+                None => [f32::NAN; LANES],
+            };
             let per_metre = (TAU / interval_m) as f32;
             for lane in 0..LANES {
                 let usable = if phase[lane].abs() <= f32::MAX { used[lane] } else { 0.0 };
@@ -86,11 +90,7 @@ impl<'a> Planes<'a> {
         sigmas: Option<&'a [Raster<f32>]>,
         mask: Option<&'a Raster<bool>>,
     ) -> Result<Self> {
-        let count = |what, planes: &[Raster<f32>]| {
-            let found = planes.len();
-            if found == frequencies { Ok(()) } else { Err(Error::PlaneCount { what, expected: frequencies, found }) }
-        };
-        count("phase", phases)?;
+        require_count("phase", phases, frequencies)?;
         let Some(first) = phases.first().filter(|first| !first.is_empty()) else {
             return Err(Error::Empty { width: 0, height: 0 });
         };
@@ -98,7 +98,7 @@ impl<'a> Planes<'a> {
             first.require_same_size(plane, "phase")?;
         }
         if let Some(sigmas) = sigmas {
-            count("sigma of the phase", sigmas)?;
+            require_count("sigma of the phase", sigmas, frequencies)?;
             for plane in sigmas {
                 first.require_same_size(plane, "sigma of the phase")?;
             }
@@ -106,7 +106,22 @@ impl<'a> Planes<'a> {
         if let Some(mask) = mask {
             first.require_same_size(mask, "mask")?;
         }
-        Ok(Self { phases, sigmas, mask })
+        let size = (first.width(), first.height());
+        let (phases, sigmas) =
+            (slices(phases, Raster::as_slice), sigmas.map(|sigmas| slices(sigmas, Raster::as_slice)));
+        Ok(Self { phases, sigmas, mask: mask.map(Raster::as_slice), size })
+    }
+
+    /// Checks numbers and lengths of a row of each plane.
+    pub(crate) fn of_row(row: &PhaseRow<'a>, frequencies: usize, width: usize) -> Result<Self> {
+        require_count("phase", row.phases, frequencies)?;
+        require_count("sigma of the phase", row.sigmas, frequencies)?;
+        let lengths = row.phases.iter().chain(row.sigmas).map(|row| row.len());
+        if let Some(found) = lengths.chain([row.mask.len()]).find(|found| *found != width) {
+            return Err(range_image::Error::RasterLength { width, height: 1, expected: width, found }.into());
+        }
+        let (phases, sigmas) = (slices(row.phases, |row| *row), Some(slices(row.sigmas, |row| *row)));
+        Ok(Self { phases, sigmas, mask: Some(row.mask), size: (width, 1) })
     }
 
     /// 1 where a pixel of a block is to be used.
@@ -117,13 +132,25 @@ impl<'a> Planes<'a> {
             used[..count].fill(1.0);
             return used;
         };
-        for (used, &mask) in used.iter_mut().zip(&mask.as_slice()[start..][..count]) {
+        for (used, &mask) in used.iter_mut().zip(&mask[start..][..count]) {
             *used = f32::from(u8::from(mask));
         }
         used
     }
 
     pub(crate) fn size(&self) -> (usize, usize) {
-        self.phases.first().map_or((0, 0), |first| (first.width(), first.height()))
+        self.size
     }
+}
+
+fn require_count<T>(what: &'static str, planes: &[T], expected: usize) -> Result<()> {
+    let found = planes.len();
+    if found == expected { Ok(()) } else { Err(Error::PlaneCount { what, expected, found }) }
+}
+
+/// Values of each frequency; there are no more than the largest number.
+fn slices<'a, T>(planes: &'a [T], values: impl Fn(&'a T) -> &'a [f32]) -> [&'a [f32]; MAXIMUM_FREQUENCIES] {
+    let mut slices: [&[f32]; MAXIMUM_FREQUENCIES] = [&[]; MAXIMUM_FREQUENCIES];
+    slices.iter_mut().zip(planes).for_each(|(to, plane)| *to = values(plane));
+    slices
 }

@@ -101,7 +101,7 @@ fn search_chunk(lattice: &Lattice, planes: &Planes<'_>, first: usize, length: us
         || {
             for start in (0..length).step_by(LANES) {
                 let size = LANES.min(length - start);
-                let found = lattice.search::<MAXIMUM_RANKS>(planes, first + start, size);
+                let found = lattice.search::<MAXIMUM_RANKS>(planes, first + start, size, true);
                 for (rank, lines) in lines.chunks_exact_mut(3).enumerate() {
                     let quantities = [&found.range_m[rank], &found.misfit[rank], &found.probability[rank]];
                     for (line, lanes) in lines.iter_mut().zip(quantities) {

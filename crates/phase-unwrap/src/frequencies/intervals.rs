@@ -52,36 +52,3 @@ fn common_divisor(a: f64, b: f64) -> f64 {
     }
     a
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn intervals_combine_as_least_common_multiples() {
-        let interval = |hz: &[f64]| {
-            let modulations: Vec<_> = hz.iter().map(|&hz| Modulation::new(hz).unwrap()).collect();
-            combined_interval_m(&modulations).unwrap()
-        };
-        let single = |hz: f64| Modulation::new(hz).unwrap().ambiguity_interval_m();
-        for (hz, common) in [
-            (vec![80e6, 60e6], 20e6),
-            (vec![100e6, 80e6], 20e6),
-            (vec![16e6, 80e6, 120e6], 8e6),
-            (vec![80.32e6, 60.24e6], 20.08e6),
-        ] {
-            // Euclid's steps multiply rounding errors of 1e-16 by the quotients, which are below a hundred here.
-            assert!((interval(&hz) / single(common) - 1.0).abs() < 1e-9, "{hz:?}");
-        }
-        // Without a common divisor above the tolerance the interval is at least 1e4 single ones.
-        assert!(interval(&[80e6, 80e6 / std::f64::consts::SQRT_2]) > 1e4 * single(80e6));
-    }
-
-    #[test]
-    fn frequencies_too_far_apart_have_no_combined_interval() {
-        let modulations = [1e3, 1e9].map(|hz| Modulation::new(hz).unwrap());
-        let found = combined_interval_m(&modulations);
-        assert!(matches!(found, Err(Error::OutOfDomain { value, .. }) if (value - 1e6).abs() < 1.0), "{found:?}");
-    }
-}

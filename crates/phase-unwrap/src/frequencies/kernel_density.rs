@@ -52,18 +52,22 @@ impl KernelDensityOptions {
     }
 }
 
-/// Hypotheses of a whole frame. A row holds one line with margins for each of: ranges, probabilities, the kernel's
-/// inverse squared width, the fit. What lies outside the image has probability 0.
+/// Hypotheses of the rows around one, kept while the rows of a frame are taken one after the other. A row holds one line with
+/// margins for each of: ranges, probabilities, the kernel's inverse squared width, the fit. What lies outside the image has
+/// probability 0.
 #[derive(Debug, Default, Clone)]
-pub(crate) struct Ranked {
+pub struct RowWindow {
     lines: Vec<f32>,
     layout: Layout,
     neighbours: Vec<Neighbour>,
+    /// Which of the rows kept was taken first; the next one takes its place.
+    oldest: usize,
 }
 
 /// Where things lie in a row of hypotheses.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(crate) struct Layout {
+    width: usize,
     /// Columns of a line with its margins.
     padded: usize,
     radius: usize,
@@ -91,20 +95,41 @@ const LINES: usize = 2 * RANKS + 2;
 const WIDTH_LINE: usize = 2 * RANKS;
 const FIT_LINE: usize = 2 * RANKS + 1;
 
-impl Ranked {
-    /// Takes the size of a frame; `interval_m` is that of the highest frequency.
-    pub(crate) fn resize(&mut self, width: usize, height: usize, interval_m: f32, options: KernelDensityOptions) {
-        let radius = usize::from(options.radius);
+impl RowWindow {
+    /// Takes the width of a frame; `interval_m` is that of the highest frequency. Without a kernel, each row is for itself.
+    pub(crate) fn resize(&mut self, width: usize, interval_m: f32, options: Option<KernelDensityOptions>) {
+        let radius = options.map_or(0, |options| usize::from(options.radius));
         let padded = width.div_ceil(LANES) * LANES + 2 * radius;
         let (tolerance_m, widest_m) = (TOLERANCE_CYCLES * interval_m, WIDEST_CYCLES * interval_m);
-        let layout = Layout { padded, radius, tolerance_m, widest_m };
-        let length = layout.row_length() * (height + 2 * radius);
-        if self.layout != layout || self.lines.len() != length {
-            self.lines.clear();
-            self.lines.resize(length, 0.0);
+        let layout = Layout { width, padded, radius, tolerance_m, widest_m };
+        if self.layout != layout {
             self.layout = layout;
+            self.lines.clear();
+            self.lines.resize(layout.row_length() * (2 * radius + 1), 0.0);
+            self.oldest = 0;
             self.set_neighbours();
         }
+    }
+
+    /// Columns of the frame.
+    pub(crate) fn width(&self) -> usize {
+        self.layout.width
+    }
+
+    /// The place of the next row, which is that of the oldest one.
+    pub(crate) fn next_mut(&mut self) -> (Layout, &mut [f32]) {
+        let (length, place) = (self.layout.row_length(), self.oldest);
+        self.oldest = (place + 1) % (2 * self.layout.radius + 1);
+        (self.layout, &mut self.lines[place * length..][..length])
+    }
+
+    /// One of the rows kept, from the oldest.
+    #[inline(always)]
+    fn row(&self, index: usize) -> &[f32] {
+        let (length, count) = (self.layout.row_length(), 2 * self.layout.radius + 1);
+        let place = self.oldest + index;
+        let place = if place < count { place } else { place - count };
+        &self.lines[place * length..][..length]
     }
 
     fn set_neighbours(&mut self) {
@@ -125,22 +150,18 @@ impl Ranked {
         }
     }
 
-    /// The image's rows without the margins above and below, `layout.row_length()` values each.
-    pub(crate) fn rows_mut(&mut self) -> (Layout, &mut [f32]) {
-        let margin = self.layout.row_length() * self.layout.radius;
-        let end = self.lines.len() - margin;
-        (self.layout, &mut self.lines[margin..end])
-    }
-
-    /// Chooses among the hypotheses of the pixels from column `col` of a row.
+    /// Chooses among the hypotheses of the pixels from column `col` of the row in the middle.
     #[inline(always)]
-    pub(crate) fn choose(&self, row: usize, col: usize) -> Chosen {
-        let own = &self.lines[(row + self.layout.radius) * self.layout.row_length()..][..self.layout.row_length()];
+    pub(crate) fn choose(&self, col: usize) -> Chosen {
+        let own = self.row(self.layout.radius);
         let at = self.layout.radius + col;
         let range_m: [Lanes; RANKS] = std::array::from_fn(|rank| self.layout.line(own, rank, at));
         let mut weight: [Lanes; RANKS] = std::array::from_fn(|rank| self.layout.line(own, RANKS + rank, at));
-        if !Self::settled(&weight) {
-            let density = self.density(row, col, &range_m, &self.layout.line(own, WIDTH_LINE, at));
+        if is_alone(&weight) {
+            return Chosen { range_m: range_m[0], confidence: self.layout.line(own, FIT_LINE, at) };
+        }
+        if !self.neighbours.is_empty() && !Self::settled(&weight) {
+            let density = self.density(col, &range_m, &self.layout.line(own, WIDTH_LINE, at));
             let background = Self::background_of(&density);
             for rank in 0..RANKS {
                 for lane in 0..LANES {
@@ -185,11 +206,10 @@ impl Ranked {
 
     /// Density of the neighbours' hypotheses at the range of each hypothesis, 1 where all neighbours agree.
     #[inline(always)]
-    fn density(&self, row: usize, col: usize, range_m: &[Lanes; RANKS], inverse: &Lanes) -> [Lanes; RANKS] {
+    fn density(&self, col: usize, range_m: &[Lanes; RANKS], inverse: &Lanes) -> [Lanes; RANKS] {
         let mut density = [[0.0; LANES]; RANKS];
         for neighbour in &self.neighbours {
-            let length = self.layout.row_length();
-            let other = &self.lines[(row + neighbour.rows) * length..][..length];
+            let other = self.row(neighbour.rows);
             for rank in 0..RANKS {
                 let ranges = self.layout.line(other, rank, col + neighbour.cols);
                 let probabilities = self.layout.line(other, RANKS + rank, col + neighbour.cols);
@@ -230,13 +250,29 @@ impl Layout {
         let mut put = |line: usize, lanes: &Lanes| {
             row[line * self.padded + self.radius + col..][..LANES].copy_from_slice(lanes);
         };
-        for rank in 0..RANKS {
+        // Ranges without probability are not looked at.
+        for rank in 0..if found.alone { 1 } else { RANKS } {
             put(rank, &found.range_m[rank]);
+        }
+        for rank in 0..RANKS {
             put(RANKS + rank, &found.probability[rank]);
         }
         put(WIDTH_LINE, &inverse);
         put(FIT_LINE, &found.acceptable);
     }
+}
+
+/// Whether each pixel has one hypothesis and no other.
+#[inline(always)]
+fn is_alone<const K: usize>(probability: &[Lanes; K]) -> bool {
+    let mut off = 0;
+    for (rank, probability) in probability.iter().enumerate() {
+        let expected = if rank == 0 { 1.0_f32 } else { 0.0 };
+        for probability in probability {
+            off |= probability.to_bits() ^ expected.to_bits();
+        }
+    }
+    off == 0
 }
 
 /// The hypothesis with the greatest weight; its confidence is `2p - 1` with its share p of all weights.

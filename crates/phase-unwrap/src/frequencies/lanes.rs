@@ -9,7 +9,7 @@ pub(crate) const LANES: usize = 16;
 pub(crate) type Lanes = [f32; LANES];
 
 /// One and a half times 2²³: a number of this size has no bits behind the point.
-const ROUNDER: f32 = 12_582_912.0;
+pub(crate) const ROUNDER: f32 = 12_582_912.0;
 
 /// The nearest whole number, ties to even, for values below 2²² in size; without a call into the library.
 #[inline(always)]

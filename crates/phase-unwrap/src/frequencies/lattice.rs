@@ -19,6 +19,10 @@ const MAXIMUM_HYPOTHESES: usize = 4096;
 /// of them sure, a smaller one doubts ranges whose sigma is stated too small.
 const ACCEPTABLE_MISFIT: f32 = 9.0;
 
+/// Misfit beyond the best one's from which a hypothesis is not told any more: its likelihood is e^-30, a millionth of the last bit of
+/// the best one's.
+const UNLIKELY_MISFIT: f32 = 60.0;
+
 /// What does not depend on the pixel: frequencies sorted from the highest, and the hypotheses of each as reference.
 #[derive(Debug, Clone)]
 pub(crate) struct Lattice {
@@ -61,6 +65,8 @@ pub(crate) struct Found<const K: usize> {
     pub(crate) known_sigma_m: Lanes,
     /// 1, or less where not even the best hypothesis explains the phases.
     pub(crate) acceptable: Lanes,
+    /// Whether the best hypothesis of each pixel is the only likely one: the others are not told then.
+    pub(crate) alone: bool,
 }
 
 impl Lattice {
@@ -87,15 +93,22 @@ impl Lattice {
         Ok(Self { order, intervals_m, maximum_range_m, assumed_sigma: options.assumed_sigma_phase_rad, references })
     }
 
-    /// Finds the `K` best hypotheses of the pixels from `start`, `LANES` or as many as `count` says.
+    /// Finds the `K` best hypotheses of the pixels from `start`, `LANES` or as many as `count` says; of pixels for which one alone
+    /// is likely only that one, unless `all` are asked for.
     #[inline(always)]
-    pub(crate) fn search<const K: usize>(&self, planes: &Planes<'_>, start: usize, count: usize) -> Found<K> {
+    pub(crate) fn search<const K: usize>(
+        &self,
+        planes: &Planes<'_>,
+        start: usize,
+        count: usize,
+        all: bool,
+    ) -> Found<K> {
         // Missing frequencies weigh nothing, so a few sizes serve all.
         match self.order.len() {
-            2 => self.search_sized::<2, K>(planes, start, count),
-            3 => self.search_sized::<3, K>(planes, start, count),
-            4 => self.search_sized::<4, K>(planes, start, count),
-            _ => self.search_sized::<MAXIMUM_FREQUENCIES, K>(planes, start, count),
+            2 => self.search_sized::<2, K>(planes, start, count, all),
+            3 => self.search_sized::<3, K>(planes, start, count, all),
+            4 => self.search_sized::<4, K>(planes, start, count, all),
+            _ => self.search_sized::<MAXIMUM_FREQUENCIES, K>(planes, start, count, all),
         }
     }
 
@@ -105,9 +118,19 @@ impl Lattice {
         planes: &Planes<'_>,
         start: usize,
         count: usize,
+        all: bool,
     ) -> Found<K> {
         let block = Block::<F>::load(self, planes, start, count);
         let mut found = Found::<K>::none();
+        let first = &self.references[0];
+        if !all && block.led_by(0) == [true; LANES] {
+            let best = first.best::<F, K>(&block, 0, self.maximum_range_m as f32);
+            found.alone = first.is_clear(&best);
+            let ranks = if found.alone { 1 } else { K };
+            first.unpack(&block, 0, &best[..ranks], &[true; LANES], &mut found);
+            Self::finish(&block, &mut found);
+            return found;
+        }
         for (position, reference) in self.references.iter().enumerate().take(F - 1) {
             let lanes = block.led_by(position);
             if lanes.iter().any(|&led| led) {
@@ -123,6 +146,25 @@ impl Lattice {
     #[inline(always)]
     fn finish<const F: usize, const K: usize>(block: &Block<F>, found: &mut Found<K>) {
         let best = found.misfit[0];
+        let mut sum = [1.0; LANES];
+        if found.alone {
+            found.probability[0] = sum;
+        } else {
+            sum = Self::weigh(found);
+        }
+        for lane in 0..LANES {
+            found.sigma_m[lane] = 1.0 / block.total_weight[lane].max(f32::MIN_POSITIVE).sqrt();
+            let known = block.sigma_known[lane] * sum[lane] > 0.0;
+            found.known_sigma_m[lane] = select(known, found.sigma_m[lane], f32::NAN);
+            let limit = ACCEPTABLE_MISFIT * (block.members[lane] - 1.0);
+            found.acceptable[lane] = (limit / best[lane].max(f32::MIN_POSITIVE)).min(1.0);
+        }
+    }
+
+    /// Probabilities, and the sums of the likelihoods.
+    #[inline(always)]
+    fn weigh<const K: usize>(found: &mut Found<K>) -> Lanes {
+        let best = found.misfit[0];
         let mut sum = [0.0; LANES];
         for (misfit, probability) in found.misfit.iter().zip(&mut found.probability) {
             for lane in 0..LANES {
@@ -136,13 +178,7 @@ impl Lattice {
                 probability[lane] /= sum[lane].max(f32::MIN_POSITIVE);
             }
         }
-        for lane in 0..LANES {
-            found.sigma_m[lane] = 1.0 / block.total_weight[lane].max(f32::MIN_POSITIVE).sqrt();
-            let known = block.sigma_known[lane] * sum[lane] > 0.0;
-            found.known_sigma_m[lane] = select(known, found.sigma_m[lane], f32::NAN);
-            let limit = ACCEPTABLE_MISFIT * (block.members[lane] - 1.0);
-            found.acceptable[lane] = (limit / best[lane].max(f32::MIN_POSITIVE)).min(1.0);
-        }
+        sum
     }
 }
 
@@ -247,13 +283,26 @@ impl Reference {
         best
     }
 
+    /// Whether each pixel has a hypothesis, and no other that is likely beside it.
+    #[inline(always)]
+    fn is_clear<const K: usize>(&self, best: &[[u32; LANES]; K]) -> bool {
+        let mask = self.number_mask();
+        let mut clear = true;
+        for lane in 0..LANES {
+            let misfit = f32::from_bits(best[0][lane] & !mask);
+            let next = if K > 1 { f32::from_bits(best[1][lane] & !mask) } else { f32::INFINITY };
+            clear &= (misfit <= f32::MAX) & (next - misfit > UNLIKELY_MISFIT);
+        }
+        clear
+    }
+
     /// Ranges and misfits of the hypotheses found, for the lanes that this reference leads.
     #[inline(always)]
     fn unpack<const F: usize, const K: usize>(
         &self,
         block: &Block<F>,
         position: usize,
-        best: &[[u32; LANES]; K],
+        best: &[[u32; LANES]],
         lanes: &[bool; LANES],
         found: &mut Found<K>,
     ) {
@@ -295,6 +344,7 @@ impl<const K: usize> Found<K> {
             sigma_m: zero,
             known_sigma_m: zero,
             acceptable: zero,
+            alone: false,
         }
     }
 }

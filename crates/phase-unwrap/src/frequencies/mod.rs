@@ -8,6 +8,5 @@ pub(crate) mod intervals;
 pub(crate) mod kernel_density;
 pub(crate) mod lanes;
 pub(crate) mod lattice;
-pub(crate) mod logarithm;
 pub(crate) mod multi_frequency;
-pub(crate) mod phasor;
+pub(crate) mod rows;

@@ -1,19 +1,17 @@
 //! Unwrapping with several frequencies: hypotheses for each pixel, and a choice among them.
 
-use std::f32::consts::TAU;
-
-use range_image::{Modulation, Raster, with_wide_registers};
+use range_image::{Modulation, Raster};
 use rayon::prelude::*;
 
 use crate::frequencies::frame::Planes;
-use crate::frequencies::kernel_density::{KernelDensityOptions, RANKS, Ranked, pick};
-use crate::frequencies::lanes::{LANES, nearest, scatter};
+use crate::frequencies::kernel_density::{KernelDensityOptions, RowWindow};
 use crate::frequencies::lattice::Lattice;
 use crate::tree::cycle::all_into_cycle;
 use crate::{Error, Result};
 
-/// Pixels that one thread takes at a time where rows do not matter: a multiple of the block.
-const CHUNK: usize = 256 * LANES;
+/// Rows that one thread takes at a time. The rows beside them are searched as well, twice in all: the more rows, the fewer of
+/// those; the fewer, the better the parts fit any number of threads.
+const ROWS: usize = 32;
 
 /// How several frequencies are unwrapped.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,16 +102,17 @@ pub fn unwrap_multi_frequency(
 /// Unwraps frames of the same frequencies one after the other and keeps its buffers.
 #[derive(Debug, Clone)]
 pub struct MultiUnwrapper {
-    lattice: Lattice,
-    kernel: Option<KernelDensityOptions>,
-    ranked: Ranked,
+    pub(crate) lattice: Lattice,
+    pub(crate) kernel: Option<KernelDensityOptions>,
+    /// One for each part of a frame.
+    windows: Vec<RowWindow>,
 }
 
 impl MultiUnwrapper {
     /// Fails where frequencies or options lie outside their domain.
     pub fn new(modulations: &[Modulation], options: MultiFrequencyOptions) -> Result<Self> {
         let lattice = Lattice::new(modulations, &options)?;
-        Ok(Self { lattice, kernel: options.kernel, ranked: Ranked::default() })
+        Ok(Self { lattice, kernel: options.kernel, windows: Vec::new() })
     }
 
     /// Wrap counts and ranges of a frame.
@@ -147,90 +146,47 @@ impl MultiUnwrapper {
         let taken = all_into_cycle(phases);
         let planes = Planes::new(&taken, self.lattice.order.len(), sigma_phase, mask)?;
         out.resize(planes.size(), phases.len());
-        match self.kernel {
-            Some(kernel) => self.choose_with_neighbours(&planes, kernel, out),
-            None => self.choose_alone(&planes, out),
+        // Taken out, so that all parts can look at the rest.
+        let mut windows = std::mem::take(&mut self.windows);
+        let chosen = self.choose(&planes, &mut windows, out);
+        self.windows = windows;
+        chosen?;
+        for (frequency, (wraps, phases)) in out.wraps.iter_mut().zip(phases).enumerate() {
+            let part = ROWS * phases.width();
+            let given = out.range.as_slice().par_chunks(part).zip(phases.as_slice().par_chunks(part));
+            let wraps = wraps.as_mut_slice().par_chunks_mut(part).zip(given);
+            wraps.for_each(|(wraps, (ranges, phases))| self.count_wraps(frequency, ranges, phases, wraps));
         }
-        self.count_wraps(phases, out);
         Ok(())
     }
 
-    fn choose_alone(&self, planes: &Planes<'_>, out: &mut MultiUnwrapped) {
-        let ranges = out.range.as_mut_slice().par_chunks_mut(CHUNK);
-        let qualities =
-            out.sigma.as_mut_slice().par_chunks_mut(CHUNK).zip(out.confidence.as_mut_slice().par_chunks_mut(CHUNK));
-        ranges.zip(qualities).enumerate().for_each(|(chunk, (range, (sigma, confidence)))| {
-            with_wide_registers(
-                #[inline(always)]
-                || {
-                    for start in (0..range.len()).step_by(LANES) {
-                        let count = LANES.min(range.len() - start);
-                        let found = self.lattice.search::<RANKS>(planes, chunk * CHUNK + start, count);
-                        let chosen = pick(&found.range_m, &found.probability, &found.acceptable);
-                        scatter(range, start, count, &chosen.range_m);
-                        scatter(sigma, start, count, &found.known_sigma_m);
-                        scatter(confidence, start, count, &chosen.confidence);
+    /// Ranges of a frame with their deviations and confidences.
+    fn choose(&self, planes: &Planes<'_>, windows: &mut Vec<RowWindow>, out: &mut MultiUnwrapped) -> Result<()> {
+        let ((width, height), reach) = (planes.size(), self.reach());
+        windows.resize_with(height.div_ceil(ROWS), RowWindow::default);
+        let MultiUnwrapped { range, sigma, confidence, .. } = out;
+        let [range, sigma, confidence] =
+            [range, sigma, confidence].map(|plane| plane.as_mut_slice().par_chunks_mut(ROWS * width));
+        let parts = windows.par_iter_mut().zip(range.zip(sigma.zip(confidence)));
+        parts.enumerate().try_for_each(|(part, (window, (range, (sigma, confidence))))| {
+            let (first, rows) = (part * ROWS, range.len() / width);
+            self.begin_rows(width, window);
+            for step in 0..rows + 2 * reach {
+                match (first + step).checked_sub(reach).filter(|row| *row < height) {
+                    Some(row) => {
+                        let own = row.checked_sub(first).filter(|row| *row < rows);
+                        let sigma = own.map(|row| &mut sigma[row * width..(row + 1) * width]);
+                        self.take(planes, row * width, window, sigma);
                     }
-                },
-            );
-        });
-    }
-
-    fn choose_with_neighbours(&mut self, planes: &Planes<'_>, kernel: KernelDensityOptions, out: &mut MultiUnwrapped) {
-        let (width, height) = planes.size();
-        self.ranked.resize(width, height, self.lattice.intervals_m[0] as f32, kernel);
-        let (layout, lines) = self.ranked.rows_mut();
-        let lattice = &self.lattice;
-        let rows = lines.par_chunks_mut(layout.row_length()).zip(out.sigma.as_mut_slice().par_chunks_mut(width));
-        rows.enumerate().for_each(|(row, (lines, sigma))| {
-            with_wide_registers(
-                #[inline(always)]
-                || {
-                    for col in (0..width).step_by(LANES) {
-                        let count = LANES.min(width - col);
-                        let found = lattice.search::<RANKS>(planes, row * width + col, count);
-                        layout.store(lines, col, &found);
-                        scatter(sigma, col, count, &found.known_sigma_m);
-                    }
-                },
-            );
-        });
-        let ranked = &self.ranked;
-        let ranges = out.range.as_mut_slice().par_chunks_mut(width);
-        let rows = ranges.zip(out.confidence.as_mut_slice().par_chunks_mut(width));
-        rows.enumerate().for_each(|(row, (range, confidence))| {
-            with_wide_registers(
-                #[inline(always)]
-                || {
-                    for col in (0..width).step_by(LANES) {
-                        let count = LANES.min(width - col);
-                        let chosen = ranked.choose(row, col);
-                        scatter(range, col, count, &chosen.range_m);
-                        scatter(confidence, col, count, &chosen.confidence);
-                    }
-                },
-            );
-        });
-    }
-
-    /// The counts that bring each phase nearest to the range chosen.
-    fn count_wraps(&self, phases: &[Raster<f32>], out: &mut MultiUnwrapped) {
-        for (&frequency, interval_m) in self.lattice.order.iter().zip(&self.lattice.intervals_m) {
-            let rate = (1.0 / interval_m) as f32;
-            let wraps = out.wraps[frequency].as_mut_slice().par_chunks_mut(CHUNK);
-            let ranges = out.range.as_slice().par_chunks(CHUNK).zip(phases[frequency].as_slice().par_chunks(CHUNK));
-            wraps.zip(ranges).for_each(|(wraps, (ranges, phases))| {
-                with_wide_registers(
-                    #[inline(always)]
-                    || {
-                        for ((wraps, range), phase) in wraps.iter_mut().zip(ranges).zip(phases) {
-                            let cycles = range * rate - phase * (1.0 / TAU);
-                            *wraps = if cycles.is_finite() { nearest(cycles) as i32 } else { 0 };
-                        }
-                    },
-                );
-            });
-        }
+                    None => self.take_empty_row(window),
+                }
+                if let Some(row) = step.checked_sub(2 * reach) {
+                    let at = row * width..(row + 1) * width;
+                    self.choose_row(window, &mut range[at.clone()], &mut confidence[at])?;
+                }
+            }
+            Ok(())
+        })
     }
 }
 

@@ -5,5 +5,6 @@ pub(crate) mod borders;
 pub(crate) mod continuity;
 pub(crate) mod cuts;
 pub(crate) mod known;
+pub(crate) mod logarithm;
 pub(crate) mod segments;
 pub(crate) mod surface;

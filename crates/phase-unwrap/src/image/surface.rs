@@ -5,8 +5,8 @@
 use range_image::with_wide_registers;
 use statistics::{CHI_MEDIANS, upper_median};
 
-use crate::frequencies::logarithm::logarithm;
 use crate::image::cuts::gentler;
+use crate::image::logarithm::logarithm;
 use crate::tree::grid::{Grid, wrapped};
 
 /// Largest phase variance used, rad^2: beyond it a phase says nothing anyway.

@@ -42,13 +42,20 @@ pub fn demodulate(frame: &RawFrame, options: &DemodulationOptions) -> Result<Com
 #[derive(Debug, Clone, PartialEq)]
 pub struct Demodulator {
     options: DemodulationOptions,
+    offset: bool,
 }
 
 impl Demodulator {
     /// Checks the options.
     pub fn new(options: &DemodulationOptions) -> Result<Self> {
         options.validate()?;
-        Ok(Self { options: options.clone() })
+        Ok(Self { options: options.clone(), offset: true })
+    }
+
+    /// Frames get no offset plane, for those who do not look at it.
+    #[must_use]
+    pub fn without_offset(self) -> Self {
+        Self { offset: false, ..self }
     }
 
     /// The options in use.
@@ -65,7 +72,7 @@ impl Demodulator {
 
     /// As [`Self::demodulate_into`], of samples that are borrowed. Allocates nothing where the planes fit, up to 16 steps.
     pub fn demodulate_view_into(&self, frame: &RawView<'_>, out: &mut ComplexFrame) -> Result<()> {
-        out.reshape(frame);
+        out.reshape(frame, self.offset);
         let ComplexFrame { channels, flags } = out;
         let weights = StepWeights::new(frame.phase_steps, &self.options);
         let job = ChannelJob { weights: weights.groups(), limits: self.limits(frame) };
@@ -127,7 +134,25 @@ struct ChannelJob<'a> {
 impl ChannelJob<'_> {
     /// Of the flags that the pixels have, those in `kept` stay.
     fn run<S: Sample>(&self, samples: &[S], channel: &mut ComplexChannel, flags: &mut Raster<Flags>, kept: u16) {
-        let Some(offset) = channel.offset.as_mut() else { return };
+        let length = task_length(flags.len());
+        if let Some(mut offset) = channel.offset.take() {
+            let means = offset.as_mut_slice().par_chunks_mut(length).map(Some);
+            self.run_with(samples, channel, flags, kept, means);
+            channel.offset = Some(offset);
+        } else {
+            let none = (0..flags.len().div_ceil(length)).into_par_iter().map(|_| None);
+            self.run_with(samples, channel, flags, kept, none);
+        }
+    }
+
+    fn run_with<'m, S: Sample>(
+        &self,
+        samples: &[S],
+        channel: &mut ComplexChannel,
+        flags: &mut Raster<Flags>,
+        kept: u16,
+        means: impl IndexedParallelIterator<Item = Option<&'m mut [f32]>>,
+    ) {
         let pixels = flags.len();
         let length = task_length(pixels);
         channel
@@ -135,7 +160,7 @@ impl ChannelJob<'_> {
             .as_mut_slice()
             .par_chunks_mut(length)
             .zip(channel.imaginary.as_mut_slice().par_chunks_mut(length))
-            .zip(offset.as_mut_slice().par_chunks_mut(length))
+            .zip(means)
             .zip(channel.sigma.as_mut_slice().par_chunks_mut(length))
             .zip(flags.as_mut_slice().par_chunks_mut(length))
             .enumerate()
@@ -155,7 +180,8 @@ struct DemodulationLoop<'a, S> {
     kept: u16,
     re: &'a mut [f32],
     im: &'a mut [f32],
-    mean: &'a mut [f32],
+    /// Where the offset is asked for.
+    mean: Option<&'a mut [f32]>,
     sigma: &'a mut [f32],
     flags: &'a mut [Flags],
 }
@@ -173,26 +199,26 @@ impl<S: Sample> PixelLoop for DemodulationLoop<'_, S> {
         else {
             return;
         };
-        let (Some(mean), Some(sigma)) =
-            (self.mean[start..].first_chunk_mut::<L>(), self.sigma[start..].first_chunk_mut::<L>())
-        else {
-            return;
-        };
+        let Some(sigma) = self.sigma[start..].first_chunk_mut::<L>() else { return };
         let Some(flags) = self.flags[start..].first_chunk_mut::<L>() else { return };
         let Limits { shot, dark, saturation, inverse_low, low } = self.limits;
-        let mut found = [0_u32; L];
+        let (mut found, mut keep) = ([0_u32; L], [0.0; L]);
         for lane in 0..L {
             let finite = sums.re[lane].is_finite() & sums.im[lane].is_finite() & sums.mean[lane].is_finite();
-            let keep = if finite { 0.0 } else { f32::NAN };
+            keep[lane] = if finite { 0.0 } else { f32::NAN };
             let [x, y] = [sums.re[lane] * inverse_low, sums.im[lane] * inverse_low];
             let dim = A::multiply_add(x, x, y * y) < low;
-            re[lane] = sums.re[lane] + keep;
-            im[lane] = sums.im[lane] + keep;
-            mean[lane] = sums.mean[lane] + keep;
-            sigma[lane] = (A::multiply_add(shot, sums.mean[lane].max(0.0), dark) + keep).sqrt();
+            re[lane] = sums.re[lane] + keep[lane];
+            im[lane] = sums.im[lane] + keep[lane];
+            sigma[lane] = (A::multiply_add(shot, sums.mean[lane].max(0.0), dark) + keep[lane]).sqrt();
             found[lane] = if finite { 0 } else { u32::from(Flags::NO_DATA.bits()) }
                 | if dim & finite { u32::from(Flags::LOW_AMPLITUDE.bits()) } else { 0 }
                 | if peak[lane] >= saturation { u32::from(Flags::SATURATED.bits()) } else { 0 };
+        }
+        if let Some(mean) = self.mean.as_mut().and_then(|mean| mean[start..].first_chunk_mut::<L>()) {
+            for lane in 0..L {
+                mean[lane] = sums.mean[lane] + keep[lane];
+            }
         }
         for lane in 0..L {
             flags[lane] = Flags::from_bits_retain((flags[lane].bits() & self.kept) | found[lane] as u16);

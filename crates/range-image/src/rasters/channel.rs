@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::rasters::polar::{angle, modulus};
 use crate::rasters::wide::{Arithmetic, PixelLoop, run_wide, task_length};
-use crate::{Modulation, Raster, Result};
+use crate::{Error, Modulation, Raster, Result};
 
 /// The complex image `z = A exp(i phi)` of one frequency, as separate planes.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,21 +23,44 @@ pub struct ComplexChannel {
     pub sigma: Raster<f32>,
 }
 
+/// Some pixels of a complex image.
+#[derive(Debug, Clone, Copy)]
+pub struct ComplexPixels<'a> {
+    /// Real part.
+    pub real: &'a [f32],
+    /// Imaginary part.
+    pub imaginary: &'a [f32],
+    /// Standard deviation of each part.
+    pub sigma: &'a [f32],
+}
+
+/// What is derived of them.
+#[derive(Debug)]
+pub struct PolarPixels<'a> {
+    /// As [`ComplexChannel::phase`].
+    pub phase: &'a mut [f32],
+    /// As [`ComplexChannel::amplitude`].
+    pub amplitude: &'a mut [f32],
+    /// As [`ComplexChannel::sigma_phase`], times a unit.
+    pub sigma: &'a mut [f32],
+}
+
 impl ComplexChannel {
-    /// A channel of NaN with an offset plane.
-    pub(crate) fn without_data(modulation: Modulation, width: usize, height: usize) -> Self {
+    /// A channel of NaN, with an offset plane or without.
+    pub(crate) fn without_data(modulation: Modulation, [width, height]: [usize; 2], offset: bool) -> Self {
         let plane = Raster::filled(width, height, f32::NAN);
-        Self { modulation, real: plane.clone(), imaginary: plane.clone(), offset: Some(plane.clone()), sigma: plane }
+        let offset = offset.then(|| plane.clone());
+        Self { modulation, real: plane.clone(), imaginary: plane.clone(), offset, sigma: plane }
     }
 
     /// Takes modulation and size over; values are left as they are where the size fits.
-    pub(crate) fn reshape(&mut self, modulation: Modulation, width: usize, height: usize) {
-        let fits = |plane: &Raster<f32>| (plane.width(), plane.height()) == (width, height);
-        let offset_fits = self.offset.as_ref().is_some_and(fits);
+    pub(crate) fn reshape(&mut self, modulation: Modulation, size: [usize; 2], offset: bool) {
+        let fits = |plane: &Raster<f32>| [plane.width(), plane.height()] == size;
+        let offset_fits = self.offset.as_ref().map_or(!offset, |plane| offset && fits(plane));
         if offset_fits && fits(&self.real) && fits(&self.imaginary) && fits(&self.sigma) {
             self.modulation = modulation;
         } else {
-            *self = Self::without_data(modulation, width, height);
+            *self = Self::without_data(modulation, size, offset);
         }
     }
 
@@ -155,6 +178,23 @@ impl ComplexChannel {
         out.par_chunks_mut(length).zip(parts).for_each(|(out, ((re, im), sigma))| {
             run_wide(re.len(), PlaneLoop { value, re, im, sigma, out });
         });
+    }
+}
+
+impl ComplexPixels<'_> {
+    /// As [`ComplexChannel::phase_amplitude_and_sigma_into`].
+    ///
+    /// Fails where the slices differ in length.
+    pub fn phase_amplitude_and_sigma_into(self, out: PolarPixels<'_>, unit: f32) -> Result<()> {
+        let Self { real: re, imaginary: im, sigma: given } = self;
+        let PolarPixels { phase, amplitude, sigma } = out;
+        let count = phase.len();
+        let lengths = [re.len(), im.len(), given.len(), amplitude.len(), sigma.len()];
+        if let Some(found) = lengths.into_iter().find(|found| *found != count) {
+            return Err(Error::RasterLength { width: count, height: 1, expected: count, found });
+        }
+        run_wide(count, PolarSigmaLoop { polar: PolarLoop { re, im, phase, amplitude }, given, sigma, unit });
+        Ok(())
     }
 }
 

@@ -197,8 +197,8 @@ impl ComplexFrame {
         Self { channels: Vec::new(), flags: Raster::default() }
     }
 
-    /// Gives the frame the size and the modulations of `raw`, keeping the planes that fit.
-    pub(crate) fn reshape(&mut self, raw: &RawView<'_>) {
+    /// Gives the frame the size and the modulations of `raw`, with an offset or without, keeping the planes that fit.
+    pub(crate) fn reshape(&mut self, raw: &RawView<'_>, offset: bool) {
         let (width, height) = (raw.width, raw.height);
         if (self.width(), self.height()) != (width, height) {
             self.flags = Raster::filled(width, height, Flags::empty());
@@ -206,8 +206,8 @@ impl ComplexFrame {
         self.channels.truncate(raw.modulations.len());
         for (index, &modulation) in raw.modulations.iter().enumerate() {
             match self.channels.get_mut(index) {
-                None => self.channels.push(ComplexChannel::without_data(modulation, width, height)),
-                Some(channel) => channel.reshape(modulation, width, height),
+                None => self.channels.push(ComplexChannel::without_data(modulation, [width, height], offset)),
+                Some(channel) => channel.reshape(modulation, [width, height], offset),
             }
         }
     }

@@ -14,23 +14,23 @@ use crate::kernels::lanes::{self, LANES};
 use crate::kernels::spectrum::Spectrum;
 
 /// Rows of pixels that one task takes at least; smaller tasks cost more to hand out than to do.
-const ROWS_PER_TASK: usize = 16;
+pub(crate) const ROWS_PER_TASK: usize = 16;
 
 /// One image axis: its pixels and its nodes.
 pub(crate) struct Axis {
-    pixels: usize,
-    nodes: usize,
-    spacing: usize,
-    taps: Vec<Taps>,
+    pub(super) pixels: usize,
+    pub(super) nodes: usize,
+    pub(super) spacing: usize,
+    pub(super) taps: Vec<Taps>,
     /// Weights of the pixels of a cell in its three nodes; zero beyond the cell.
     lanes: [[f32; LANES]; 3],
 }
 
 /// The nodes that a pixel belongs to: the first of `Axis::tap_count` in a row, and the weight of each.
 #[derive(Clone, Copy)]
-struct Taps {
-    first: usize,
-    weights: [f32; 3],
+pub(super) struct Taps {
+    pub(super) first: usize,
+    pub(super) weights: [f32; 3],
 }
 
 impl Axis {
@@ -95,7 +95,7 @@ impl Axis {
     }
 
     /// Length of a line of pixels that [`lanes::collect`] and [`lanes::spread`] can work on.
-    fn line_length(&self) -> usize {
+    pub(super) fn line_length(&self) -> usize {
         self.pixels.next_multiple_of(self.spacing) + LANES
     }
 
@@ -113,7 +113,7 @@ impl Axis {
     }
 
     /// Interpolates a row of nodes at its pixels, times `factor`.
-    fn spread(&self, nodes: &[Complex<f32>], factor: f32, [re, im]: [&mut [f32]; 2]) {
+    pub(super) fn spread(&self, nodes: &[Complex<f32>], factor: f32, [re, im]: [&mut [f32]; 2]) {
         if self.spacing == 1 {
             let pixels = re.iter_mut().zip(im);
             nodes.iter().zip(pixels).for_each(|(node, (re, im))| (*re, *im) = (factor * node.re, factor * node.im));
@@ -145,17 +145,17 @@ impl Axis {
 
 /// Both axes, with the buffers between them.
 pub(crate) struct Grid {
-    axes: [Axis; 2],
+    pub(super) axes: [Axis; 2],
     bands: [[Vec<f32>; 5]; 2],
     /// Weights of the rows of a cell in its three rows of nodes, with the scale of both axes.
     row_weights: Vec<[f32; 3]>,
     /// Real and imaginary part of three sums over the rows of each cell.
     sums: [Vec<f32>; 2],
     /// Real and imaginary part with the pixels' columns and the nodes' rows, in lines that go on for some zeros.
-    halfway: [Vec<f32>; 2],
+    pub(super) halfway: [Vec<f32>; 2],
     spare: Vec<Complex<f32>>,
     /// A row of pixels.
-    row: Vec<f32>,
+    pub(super) row: Vec<f32>,
 }
 
 impl Grid {
@@ -258,66 +258,6 @@ impl Grid {
     /// Distance of the nodes along a row and along a column.
     pub(crate) fn spacing(&self) -> [usize; 2] {
         self.axes.each_ref().map(Axis::spacing)
-    }
-
-    /// Adds `factor` times what lies on the nodes to planes of pixels: quadratic spline.
-    pub(crate) fn add_interpolated(
-        &mut self,
-        nodes: &[Complex<f32>],
-        factor: f32,
-        real: &mut [f32],
-        imaginary: &mut [f32],
-    ) {
-        if self.is_fine() {
-            for (node, (re, im)) in nodes.iter().zip(real.iter_mut().zip(imaginary)) {
-                *re += factor * node.re;
-                *im += factor * node.im;
-            }
-            return;
-        }
-        let [across, down] = &self.axes;
-        let (width, length) = (across.pixels, across.line_length());
-        let [re, im] = &mut self.halfway;
-        let lines = re.par_chunks_mut(length).zip(im.par_chunks_mut(length));
-        let lines = lines.zip(nodes.par_chunks(across.nodes)).with_min_len(ROWS_PER_TASK);
-        lines.for_each(|((re, im), nodes)| across.spread(nodes, factor, [re, im]));
-        for (plane, halfway) in [real, imaginary].into_iter().zip(&self.halfway) {
-            let line = |node: usize| &halfway[node * length..][..width];
-            plane.par_chunks_mut(width).with_min_len(ROWS_PER_TASK).zip(&down.taps).for_each(|(row, taps)| {
-                if down.spacing == 1 {
-                    row.iter_mut().zip(line(taps.first)).for_each(|(pixel, value)| *pixel += value);
-                } else {
-                    let lines = [0, 1, 2].map(|tap| line(taps.first + tap));
-                    with_wide_registers(
-                        #[inline(always)]
-                        || lanes::add_weighted(row, taps.weights, lines),
-                    );
-                }
-            });
-        }
-    }
-
-    /// Shows the real part of what lies on the nodes, interpolated, row by row of pixels.
-    pub(crate) fn visit_interpolated(&mut self, nodes: &[Complex<f32>], mut visit: impl FnMut(usize, &[f32])) {
-        let [across, down] = &self.axes;
-        let (width, length) = (across.pixels, across.line_length());
-        let [re, im] = &mut self.halfway;
-        let lines = re.chunks_exact_mut(length).zip(im.chunks_exact_mut(length)).zip(nodes.chunks_exact(across.nodes));
-        lines.for_each(|((re, im), nodes)| across.spread(nodes, 1.0, [re, im]));
-        for (index, taps) in down.taps.iter().enumerate() {
-            let line = |node: usize| &re[node * length..][..width];
-            if down.spacing == 1 {
-                visit(index, line(taps.first));
-                continue;
-            }
-            let (lines, row) = ([0, 1, 2].map(|tap| line(taps.first + tap)), &mut self.row);
-            row.fill(0.0);
-            with_wide_registers(
-                #[inline(always)]
-                || lanes::add_weighted(row, taps.weights, lines),
-            );
-            visit(index, row);
-        }
     }
 
     /// The spectrum of [`Self::round_trip`] away from the borders, on a torus of `size` nodes.

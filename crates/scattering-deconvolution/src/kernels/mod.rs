@@ -3,6 +3,7 @@
 pub(crate) mod blobs;
 pub(crate) mod convolution;
 pub(crate) mod grid;
+pub(crate) mod interpolation;
 pub(crate) mod kernel;
 pub(crate) mod lanes;
 pub(crate) mod operator;

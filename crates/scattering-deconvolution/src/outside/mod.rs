@@ -140,12 +140,7 @@ impl OutsideLightDetector {
             let (expected, found) = (self.size[0] * self.size[1], channel.real.len());
             return Err(Error::PlaneLength { what: "the image", expected, found });
         }
-        let dark = self.options.dark;
-        let is_dark = |pixel: usize, [re, im]: [f32; 2]| match dark {
-            DarkPixels::Flagged => flags.as_slice()[pixel].intersects(Flags::LOW_AMPLITUDE),
-            DarkPixels::Below(limit) => re.hypot(im) < limit,
-        };
-        // Of most frames no block is dark, which a look at its first pixel tells.
+        let is_dark = self.is_dark(flags);
         if !self.blocks.any_dark(channel, is_dark) {
             return Ok(OutsideLightVerdict::NotTestable { redundancy: 0.0 });
         }
@@ -159,6 +154,26 @@ impl OutsideLightDetector {
                 OutsideLightVerdict::Suspected(self.suspect(segment, light, p_value, channel, flags))
             }
         })
+    }
+
+    /// Whether any block of an image, restored or not yet, can be dark: where none is, [`Self::detect`] finds nothing. Of most
+    /// frames none is, which a look at the first pixel of each tells.
+    pub fn may_detect(&self, channel: &ComplexChannel, flags: &Raster<Flags>) -> bool {
+        let fits =
+            [&channel.real, &channel.imaginary].into_iter().all(|plane| plane.require_same_size(flags, "").is_ok());
+        let restored = matches!(self.options.dark, DarkPixels::Below(_));
+        restored
+            || !fits
+            || [flags.width(), flags.height()] != self.size
+            || self.blocks.any_dark(channel, self.is_dark(flags))
+    }
+
+    fn is_dark<'a>(&self, flags: &'a Raster<Flags>) -> impl Fn(usize, [f32; 2]) -> bool + Copy + use<'a> {
+        let dark = self.options.dark;
+        move |pixel: usize, [re, im]: [f32; 2]| match dark {
+            DarkPixels::Flagged => flags.as_slice()[pixel].intersects(Flags::LOW_AMPLITUDE),
+            DarkPixels::Below(limit) => re.hypot(im) < limit,
+        }
     }
 
     /// The part of the border that explains the dark blocks best.

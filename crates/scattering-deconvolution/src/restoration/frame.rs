@@ -47,6 +47,7 @@ impl Restorer {
         mut told: impl FnMut(RestorationSummary),
     ) -> Result<()> {
         let ComplexFrame { channels, flags } = frame;
+        self.left.iter_mut().for_each(|left| left.work = None);
         for channel in channels {
             told(self.restore_flagged(channel, flags)?);
             for &pixel in self.dependent_pixels() {

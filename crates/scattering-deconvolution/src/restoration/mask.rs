@@ -1,8 +1,10 @@
 //! Pixels that have no value, or one that must not be touched.
 
 use range_image::{Flags, with_wide_registers};
+use rayon::prelude::*;
 
 use crate::SaturatedLight;
+use crate::kernels::grid::ROWS_PER_TASK;
 use crate::kernels::lanes::largest_part;
 
 /// Pixels put aside while the image is restored, with their values.
@@ -13,6 +15,8 @@ pub(crate) struct Mask {
     dependent: Vec<usize>,
     /// Pixels of a row that are filled.
     unknown: Vec<bool>,
+    /// Largest absolute value of each row; `None` where there is something to put aside.
+    rows: Vec<Option<f32>>,
 }
 
 /// A pixel put aside: its own value, and the one that counts as light meanwhile.
@@ -38,27 +42,35 @@ impl Mask {
         self.kept.clear();
         self.dependent.clear();
         self.filled = 0;
+        self.look_at_rows(width, re, im, flags);
         let mut largest = 0.0_f32;
         for (row, (re, im)) in re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width)).enumerate() {
+            if let Some(of_row) = self.rows[row] {
+                largest = largest.max(of_row);
+                continue;
+            }
             let flags = flags.map(|flags| &flags[row * width..][..width]);
-            let mut parts = with_wide_registers(
-                #[inline(always)]
-                || [largest_part(re), largest_part(im)],
-            );
-            let complete = parts.iter().all(|part| part.is_finite());
-            match flags.filter(|flags| union(flags).intersects(UNTOUCHED)) {
-                None if complete => {}
-                Some(flags) if complete && saturated == SaturatedLight::Clipped => {
+            match flags {
+                Some(flags) if saturated == SaturatedLight::Clipped && largest_of(re, im).is_finite() => {
                     self.put_aside_flagged(row * width, re, im, flags);
                 }
-                flags => {
-                    self.put_aside_row(row * width, re, im, flags, saturated);
-                    parts = [largest_part(re), largest_part(im)];
-                }
+                flags => self.put_aside_row(row * width, re, im, flags, saturated),
             }
-            largest = largest.max(parts[0]).max(parts[1]);
+            largest = largest.max(largest_of(re, im));
         }
         largest
+    }
+
+    /// Of most rows nothing is put aside, which is found out side by side.
+    fn look_at_rows(&mut self, width: usize, re: &[f32], im: &[f32], flags: Option<&[Flags]>) {
+        self.rows.clear();
+        self.rows.resize(re.len() / width, None);
+        self.rows.par_iter_mut().with_min_len(ROWS_PER_TASK).enumerate().for_each(|(row, largest)| {
+            let at = row * width..(row + 1) * width;
+            let parts = largest_of(&re[at.clone()], &im[at.clone()]);
+            let flagged = flags.is_some_and(|flags| union(&flags[at]).intersects(UNTOUCHED));
+            *largest = Some(parts).filter(|parts| parts.is_finite() && !flagged);
+        });
     }
 
     /// Puts aside the flagged pixels of a row in which nothing is filled.
@@ -133,6 +145,16 @@ impl Mask {
         let mut kept = self.kept[first..].iter().map(|kept| kept.pixel).peekable();
         self.dependent.extend(row.filter(|&pixel| kept.next_if_eq(&pixel).is_none() && depends(pixel)));
     }
+}
+
+/// Largest absolute value of either part; not finite as soon as one value is not.
+fn largest_of(re: &[f32], im: &[f32]) -> f32 {
+    let [re, im] = with_wide_registers(
+        #[inline(always)]
+        || [largest_part(re), largest_part(im)],
+    );
+    // As `largest_part` compares them.
+    f32::from_bits(re.to_bits().max(im.to_bits()))
 }
 
 /// Flags that are looked at together.

@@ -4,11 +4,12 @@ use range_image::{ComplexChannel, Flags, Modulation, Raster};
 
 use crate::kernels::convolution::check_size;
 use crate::restoration::mask::Mask;
+use crate::restoration::rows::Left;
 use crate::restoration::work::Work;
 use crate::{Error, Psf, RestorationOptions, Result};
 
 /// Modulations for which operators are kept.
-const MODULATIONS: usize = 8;
+pub(crate) const MODULATIONS: usize = 8;
 
 /// What a restoration did, and how well.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,11 +42,13 @@ pub struct RestorationSummary {
 /// allocates nothing after the first image.
 pub struct Restorer {
     psf: Psf,
-    size: [usize; 2],
+    pub(crate) size: [usize; 2],
     options: RestorationOptions,
     /// One for all modulations, or one for each.
-    works: Vec<(Option<Modulation>, Work)>,
+    pub(crate) works: Vec<(Option<Modulation>, Work)>,
     mask: Mask,
+    /// What is left to be taken off row by row, of each channel.
+    pub(crate) left: Vec<Left>,
 }
 
 impl Restorer {
@@ -66,14 +69,14 @@ impl Restorer {
         } else {
             vec![(None, Work::new(psf, size, options)?)]
         };
-        Ok(Self { psf: psf.clone(), size, options: *options, works, mask: Mask::default() })
+        Ok(Self { psf: psf.clone(), size, options: *options, works, mask: Mask::default(), left: Vec::new() })
     }
 
     /// Restores one complex image in place and propagates its sigma. Where it fails, the image stays as it was.
     ///
     /// Pixels that are not finite keep their value and disturb no other.
     pub fn restore(&mut self, channel: &mut ComplexChannel) -> Result<RestorationSummary> {
-        self.restore_channel(channel, None)
+        self.restore_channel(channel, None, None)
     }
 
     /// As [`Self::restore`]; pixels that are flagged as saturated or without data keep their value as well. What the light
@@ -84,7 +87,18 @@ impl Restorer {
         flags: &Raster<Flags>,
     ) -> Result<RestorationSummary> {
         channel.real.require_same_size(flags, "flags")?;
-        self.restore_channel(channel, Some(flags.as_slice()))
+        self.restore_channel(channel, Some(flags.as_slice()), None)
+    }
+
+    /// As [`Self::restore_flagged`]; where nothing is put aside, what is to be done is left for each row.
+    pub(crate) fn restore_or_leave(
+        &mut self,
+        channel: &mut ComplexChannel,
+        flags: &Raster<Flags>,
+        left: &mut Left,
+    ) -> Result<RestorationSummary> {
+        channel.real.require_same_size(flags, "flags")?;
+        self.restore_channel(channel, Some(flags.as_slice()), Some(left))
     }
 
     /// Restores the two planes (row by row) of an image without sigma.
@@ -93,7 +107,7 @@ impl Restorer {
     /// As [`Self::restore`]; a ghost that is late by a way in metres needs a modulation, so give
     /// [`Psf::at_modulation`] to [`Self::new`].
     pub fn restore_planes(&mut self, real: &mut [f32], imaginary: &mut [f32]) -> Result<RestorationSummary> {
-        self.restore_kept(None, real, imaginary, None).map(|(summary, _)| summary)
+        self.restore_kept(None, [real, imaginary], None, None).map(|(summary, _)| summary)
     }
 
     /// Pixels of the last restored image whose correction depends strongly on light that is not known, in order: that of
@@ -102,7 +116,12 @@ impl Restorer {
         self.mask.dependent()
     }
 
-    fn restore_channel(&mut self, channel: &mut ComplexChannel, flags: Option<&[Flags]>) -> Result<RestorationSummary> {
+    fn restore_channel(
+        &mut self,
+        channel: &mut ComplexChannel,
+        flags: Option<&[Flags]>,
+        mut left: Option<&mut Left>,
+    ) -> Result<RestorationSummary> {
         channel.validate()?;
         let size = [channel.real.width(), channel.real.height()];
         if size != self.size {
@@ -111,11 +130,18 @@ impl Restorer {
             let what = "the image";
             return Err(range_image::Error::SizeMismatch { what, width, height, found_width, found_height }.into());
         }
-        let (real, imaginary) = (channel.real.as_mut_slice(), channel.imaginary.as_mut_slice());
-        let (summary, index) = self.restore_kept(Some(&channel.modulation), real, imaginary, flags)?;
-        if let Some((_, work)) = index.and_then(|index| self.works.get_mut(index)) {
-            work.propagate_sigma(channel.sigma.as_mut_slice(), &self.mask);
+        let planes = [channel.real.as_mut_slice(), channel.imaginary.as_mut_slice()];
+        let (summary, index) = self.restore_kept(Some(&channel.modulation), planes, flags, left.as_deref_mut())?;
+        let sigma = channel.sigma.as_mut_slice();
+        let Some((_, work)) = index.and_then(|index| self.works.get_mut(index)) else { return Ok(summary) };
+        if let Some(left) = left.filter(|left| left.work.is_some()) {
+            let gain = work.gain_of_all(sigma);
+            left.gain = gain.unwrap_or(1.0);
+            if gain.is_some() {
+                return Ok(summary);
+            }
         }
+        work.propagate_sigma(sigma, &self.mask);
         Ok(summary)
     }
 
@@ -123,9 +149,9 @@ impl Restorer {
     fn restore_kept(
         &mut self,
         modulation: Option<&Modulation>,
-        real: &mut [f32],
-        imaginary: &mut [f32],
+        [real, imaginary]: [&mut [f32]; 2],
         flags: Option<&[Flags]>,
+        left: Option<&mut Left>,
     ) -> Result<(RestorationSummary, Option<usize>)> {
         let expected = self.size[0] * self.size[1];
         for (what, plane) in [("real part", &*real), ("imaginary part", &*imaginary)] {
@@ -139,8 +165,13 @@ impl Restorer {
         let mut work = index.and_then(|index| works.get_mut(index)).map(|(_, work)| work);
         let outcome = work.as_mut().map_or(Ok((0, 0.0)), |work| {
             let found = work.solve(real, imaginary, f64::from(largest), options)?;
-            work.take_off(real, imaginary);
-            work.find_dependent(real, imaginary, mask, options.dependence_limit);
+            if let Some(left) = left.filter(|_| mask.kept() == 0) {
+                work.leave(left);
+                left.work = index;
+            } else {
+                work.take_off(real, imaginary);
+                work.find_dependent(real, imaginary, mask, options.dependence_limit);
+            }
             Ok::<_, Error>(found)
         });
         mask.put_back(real, imaginary);

@@ -1,6 +1,7 @@
 //! Propagation of noise through a restoration.
 
 use range_image::with_wide_registers;
+use rayon::prelude::*;
 
 use crate::kernels::lanes::finite_extremes;
 use crate::restoration::mask::Mask;
@@ -9,6 +10,8 @@ use crate::restoration::work::Work;
 
 /// Share of a variance below which what other pixels add is left out: 0.05 % of sigma.
 const NEGLIGIBLE: f64 = 1e-3;
+/// Pixels that one task takes; smaller tasks cost more to hand out than to do.
+const CHUNK: usize = 1 << 15;
 
 impl Work {
     /// Turns the standard deviations of the observed image into those of the restored one, in place.
@@ -16,25 +19,35 @@ impl Work {
     /// The noise of pixels is independent before and correlated afterwards; sigma is that of each pixel by itself.
     /// Pixels put aside keep their sigma and, as filled or clipped values, bring no noise to others. NaN stays NaN.
     pub(crate) fn propagate_sigma(&mut self, sigma: &mut [f32], mask: &Mask) {
-        let [least, most] = with_wide_registers(
-            #[inline(always)]
-            || finite_extremes(sigma),
-        )
-        .map(|value| f64::from(value).powi(2));
-        if most <= 0.0 {
+        let extremes = extremes(sigma);
+        if extremes[1] <= 0.0 {
             return;
         }
         self.kept_sigma.clear();
         self.kept_sigma.extend(mask.pixels().map(|pixel| sigma[pixel]));
-        let noise = &self.model.noise;
-        let own = (1.0 - noise.largest_centre()).powi(2);
-        if noise.surroundings * most <= NEGLIGIBLE * own * least {
-            scale(sigma, &noise.centre);
+        if self.is_own_noise(extremes) {
+            scale(sigma, &self.model.noise.centre);
         } else {
             self.scatter_variance(sigma, mask);
             add(sigma, &self.model.noise.centre, &self.variance[0]);
         }
         mask.pixels().zip(&self.kept_sigma).for_each(|(pixel, value)| sigma[pixel] = *value);
+    }
+
+    /// Factor of all sigmas, where nothing is put aside and it is the same for all pixels.
+    pub(crate) fn gain_of_all(&self, sigma: &[f32]) -> Option<f32> {
+        match self.model.noise.centre {
+            Centre::Same(centre) if self.is_own_noise(extremes(sigma)) => Some(own_gain(centre)),
+            _ => None,
+        }
+    }
+
+    /// Whether noise of other pixels does not count, given the least and the largest sigma.
+    fn is_own_noise(&self, extremes: [f32; 2]) -> bool {
+        let [least, most] = extremes.map(|value| f64::from(value).powi(2));
+        let noise = &self.model.noise;
+        let own = (1.0 - noise.largest_centre()).powi(2);
+        noise.surroundings * most <= NEGLIGIBLE * own * least
     }
 
     /// Puts `q^2 * var` into the first variance plane.
@@ -54,14 +67,28 @@ impl Work {
     }
 }
 
+/// Smallest and largest sigma that is known.
+fn extremes(sigma: &[f32]) -> [f32; 2] {
+    let extremes = sigma.par_chunks(CHUNK).map(|sigma| {
+        with_wide_registers(
+            #[inline(always)]
+            || finite_extremes(sigma),
+        )
+    });
+    extremes.reduce(|| [f32::INFINITY, 0.0], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
+}
+
+/// What a pixel keeps of its own noise.
+fn own_gain(centre: f64) -> f32 {
+    (1.0 - centre).abs() as f32
+}
+
 /// What each pixel keeps of its own noise, where that of the others does not count.
 fn scale(sigma: &mut [f32], centre: &Centre) {
     match centre {
         Centre::Same(centre) => {
-            let gain = (1.0 - centre).abs() as f32;
-            for value in sigma {
-                *value *= gain;
-            }
+            let gain = own_gain(*centre);
+            sigma.par_chunks_mut(CHUNK).for_each(|sigma| sigma.iter_mut().for_each(|value| *value *= gain));
         }
         Centre::Pixels(centres) => {
             sigma.iter_mut().zip(centres).for_each(|(value, centre)| *value *= (1.0 - centre).abs());

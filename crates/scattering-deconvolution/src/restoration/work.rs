@@ -18,7 +18,7 @@ pub(crate) struct Work {
     /// Observed light on the nodes.
     observed: Vec<Complex<f32>>,
     /// Scattered light on the nodes.
-    scattered: Vec<Complex<f32>>,
+    pub(crate) scattered: Vec<Complex<f32>>,
     pub(crate) spare: Vec<Complex<f32>>,
     pub(crate) variance: [Vec<f32>; 2],
     pub(crate) kept_sigma: Vec<f32>,

@@ -74,17 +74,26 @@ pub fn combine_pixels(ranges: &[&[f32]], sigmas: &[&[f32]], out: CombinedPixels<
     with_wide_registers(
         #[inline(always)]
         || {
-            let mut out = [&mut *range, &mut *sigma, &mut *chi_squared];
-            let whole = count / LANES * LANES;
-            for start in (0..whole).step_by(LANES) {
-                combine_lanes::<LANES>(ranges, sigmas, start, &mut out);
-            }
-            for start in whole..count {
-                combine_lanes::<1>(ranges, sigmas, start, &mut out);
+            let out = [&mut *range, &mut *sigma, &mut *chi_squared];
+            // Of two, as most cameras have, the compiler knows the number: a sixth of the time of a live frame of 512x512.
+            match (ranges, sigmas) {
+                (&[a, b], &[c, d]) => combine_all(&[a, b], &[c, d], out),
+                _ => combine_all(ranges, sigmas, out),
             }
         },
     );
     Ok(())
+}
+
+#[inline(always)]
+fn combine_all(ranges: &[&[f32]], sigmas: &[&[f32]], mut out: [&mut [f32]; 3]) {
+    let whole = out[0].len() / LANES * LANES;
+    for start in (0..whole).step_by(LANES) {
+        combine_lanes::<LANES>(ranges, sigmas, start, &mut out);
+    }
+    for start in whole..out[0].len() {
+        combine_lanes::<1>(ranges, sigmas, start, &mut out);
+    }
 }
 
 /// Means, sigmas and chi-squareds of `L` pixels from `start` on. Ranges are taken as differences from the first one, which are as

@@ -1,8 +1,8 @@
 //! From the nodes of the grid back to pixels: quadratic splines along the rows of nodes, then across them.
 
+use fourier_transforms::num_complex::Complex;
 use range_image::with_wide_registers;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex;
 
 use crate::kernels::grid::{Grid, ROWS_PER_TASK};
 use crate::kernels::lanes;

@@ -26,6 +26,7 @@ pub(crate) fn run() -> Outcome {
     for folder in &crates {
         complaints.extend(missing_parts(folder));
         complaints.extend(tests_left_out(folder)?);
+        complaints.extend(tests_switched_off(folder)?);
         complaints.extend(house::complaints(folder)?);
     }
     let files = files_below(&root)?;
@@ -81,6 +82,20 @@ fn tests_left_out(folder: &Path) -> Result<Vec<String>, String> {
     let files = entries(&folder.join("tests"))?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "rs"));
     let left_out = files.filter(|path| !modules.contains(&*path.file_stem().unwrap_or_default().to_string_lossy()));
     Ok(left_out.map(|path| format!("{} is no module of tests/main.rs", path.display())).collect())
+}
+
+/// Tests in the sources of a library whose manifest says that it has none: they would never run.
+fn tests_switched_off(folder: &Path) -> Result<Vec<String>, String> {
+    if !read(&folder.join("Cargo.toml"))?.contains("\ntest = false\n") {
+        return Ok(Vec::new());
+    }
+    let mut found = Vec::new();
+    for path in files_below(&folder.join("src"))? {
+        if read(&path)?.contains("#[test]\n") {
+            found.push(format!("{}: its tests never run, since Cargo.toml has `test = false`", path.display()));
+        }
+    }
+    Ok(found)
 }
 
 /// Keys in bold brackets at the beginning of a list entry.

@@ -25,10 +25,10 @@ const OTHER_SIDE: f64 = -0.9;
 /// Standard deviation, cells, of the height of a place that another surface meets, where its own plane is weak or those around lie on no
 /// one surface: what points of the other surface leave after all tests, in a dozen simulated rooms. Half of it: fused points beside edges err by
 /// 1.2 times what they say.
-const MEETS: f64 = 0.12;
+const MEETS: f64 = 0.1;
 /// The same of other places with weak planes: behind their edge nothing was seen. Larger: planes in frames of a Kinect scatter by less
 /// than they say; none: single fused points of them by more.
-const WEAK: f64 = 0.02;
+const WEAK: f64 = 0.03;
 /// Neighbours with firm planes that a surface is told by; with fewer, all serve.
 const ENOUGH: usize = 6;
 /// Cells around that are asked; one more where the plane is weak.

@@ -12,9 +12,8 @@ use serde_json::Value;
 
 use crate::shell::{Outcome, captured};
 
-/// What builds them, and says where they are.
-const BUILD: &str =
-    "cargo test --workspace --all-features --lib --bins --tests --no-run --message-format json-render-diagnostics";
+/// What builds them, and says where they are. With `--lib` beside it, libraries whose manifests say that they have no tests would be built too.
+const BUILD: &str = "cargo test --workspace --all-features --tests --no-run --message-format json-render-diagnostics";
 
 /// A program of tests, and the folder of its package, in which it runs.
 struct Suite {

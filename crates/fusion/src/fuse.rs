@@ -161,7 +161,7 @@ impl Task<'_> {
             .par_iter()
             .with_min_len(64)
             .map(|place| {
-                let rows = common::rows(place, &observations.all, self.errors, common)?;
+                let rows = common::rows(place, &place.normal, &observations.all, self.errors, common)?;
                 Ok((common::mean(place, &rows), Squares::new(place, &rows, common)))
             })
             .collect::<Result<Vec<_>>>()?

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use fusion::nalgebra::{DMatrix, Matrix3, Vector3};
+use fusion::point_uncertainty::{CommonError, CommonErrors, PointErrors, Source};
 use fusion::{Fused, FusionOptions, Reason, fuse};
 
 use crate::common::scene::THIN;
@@ -121,4 +123,36 @@ fn outliers_are_named_and_not_averaged() {
     assert!(fused.surfels.iter().all(|s| s.position.z.abs() < 0.01));
     // One in ten thousand is left out by chance.
     assert!(fused.unfused.len() < 12, "{}", fused.unfused.len());
+}
+
+/// A wall whose frames may have slid along it, beside their shifts across.
+struct Sliding<'a>(&'a Wall);
+
+impl PointErrors for Sliding<'_> {
+    fn noise(&self, point: usize) -> Matrix3<f64> {
+        self.0.noise(point)
+    }
+
+    fn sensor(&self, point: usize) -> Option<(u64, Vector3<f64>)> {
+        self.0.sensor(point)
+    }
+
+    fn common(&self, point: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
+        self.0.common(point, derivatives);
+        derivatives.push((self.0.centres.len() + self.0.frames[point] as usize, Vector3::x()));
+    }
+}
+
+#[test]
+fn a_plane_does_not_tell_how_frames_slid_along_it() {
+    let frames = 6;
+    let wall = Wall::new(frames, 120, 0.008, 0.0, 0.004, 77);
+    let errors = (0..2 * frames).map(|at| CommonError { name: format!("{at}"), source: Source::Pose }).collect();
+    let common = CommonErrors::new(errors, DMatrix::identity(2 * frames, 2 * frames) * 0.02_f64.powi(2)).unwrap();
+    let fused = fuse(&wall.registered(), &Sliding(&wall), &common, &FusionOptions::default()).unwrap();
+    // Tilts of places by their noise seem to tell it where derivatives are taken along them: 0.43 would be left.
+    for frame in 0..frames {
+        let left = |column: usize| fused.common.covariance()[(column, column)].sqrt() / 0.02;
+        assert!(left(frames + frame) > 0.8 && left(frame) < 0.6, "{} {}", left(frames + frame), left(frame));
+    }
 }

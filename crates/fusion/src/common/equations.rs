@@ -19,10 +19,11 @@ use crate::surfels::{Estimate, FrameSums, Gathered, Spread, bends, estimate, run
 /// Multiplications that the equations may take, a second or two of one processor. Places beyond are left out evenly: the
 /// common errors are then known a little less well, and as well as stated.
 const MOST_PRODUCTS: f64 = 3e9;
-/// Part of what places tell of common errors that is believed. What is not linear in poses and lenses, tens of micrometres, and what edges
-/// leave are alike at thousands of places, and these are taken as independent. Of simulated rooms with 19,000 points a frame, squared
-/// errors in half-determined directions over their variances are 3 with all of it, and 1.5 with a half; with 7,000 points they are 1.
-const TRUST: f64 = 0.5;
+/// Part of what places tell of common errors that is believed: what no source states is alike at places beside each other, and these are
+/// taken as independent. Residuals over blocks of eight cells have 1.4 to 2.3 times the variance of as many independent ones in frames of a
+/// Kinect, 1.2 to 1.9 times in simulated rooms. With all of it, two of 54 such frames are set apart and walls are half as thick again; squared errors of
+/// common errors in simulated rooms over their variances are 1.04 with all and 0.64 with this.
+const TRUST: f64 = 0.4;
 /// Parts that are summed up side by side; fixed, as it decides the order of the sums.
 const PARTS: usize = 8;
 /// Probability that a place of which all frames see the same is left out of the equations once they are solved. Larger ones waste
@@ -105,7 +106,7 @@ pub(crate) fn ties(
     let used: Vec<usize> = seen.into_iter().step_by(stride).collect();
     let tie = |at: &usize| {
         let place = estimate(&gathered.seeds[*at].1, &gathered.members[*at], &observations.all, &shared)?;
-        let rows = rows(&place, &observations.all, errors, common);
+        let rows = rows(&place, &around[*at].normal, &observations.all, errors, common);
         Some(rows.map(|rows| (place, rows)))
     };
     used.par_iter().with_min_len(32).filter_map(tie).collect()

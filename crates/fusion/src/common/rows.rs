@@ -1,6 +1,6 @@
 //! Derivatives of heights by common errors, column by column.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use point_uncertainty::{CommonErrors, PointErrors};
 
 use crate::Result;
@@ -12,9 +12,11 @@ pub(crate) type Row = Vec<(u32, f64)>;
 
 /// For each frame of a place the derivative of the height that it sees.
 ///
-/// Common errors vary slowly: the point next to the middle stands for all of its frame.
+/// Common errors vary slowly: the point next to the middle stands for all of its frame. Where they are to be found, the `normal` must not be
+/// that of the place's own points: its noise, squared, would tell how frames moved along a surface, which nothing tells.
 pub(crate) fn rows(
     place: &Estimate,
+    normal: &Vector3<f64>,
     all: &[Observation],
     errors: &dyn PointErrors,
     common: &CommonErrors,
@@ -25,7 +27,7 @@ pub(crate) fn rows(
         .iter()
         .map(|frame| {
             derivatives(all[frame.stands_for as usize].index as usize, errors, common, &mut buffer)?;
-            let mut row: Row = buffer.iter().map(|(column, by)| (*column as u32, by.dot(&place.normal))).collect();
+            let mut row: Row = buffer.iter().map(|(column, by)| (*column as u32, by.dot(normal))).collect();
             row.sort_by_key(|(column, _)| *column);
             row.dedup_by(|next, kept| {
                 let is_same = next.0 == kept.0;

@@ -66,7 +66,7 @@ fn leaving(
     if own.iter().all(|(height, variance)| height.abs() < PLAIN * variance.sqrt()) {
         return Ok(None);
     }
-    let rows = rows(place, &observations.all, errors, common)?;
+    let rows = rows(place, &place.normal, &observations.all, errors, common)?;
     let all = mean(place, &rows);
     let p_values: Vec<f64> = place
         .frames

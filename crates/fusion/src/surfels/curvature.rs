@@ -48,6 +48,8 @@ pub(crate) struct Bend {
     /// Height of the place over the surface that goes on from around it over its standard deviation; of places that have
     /// their plane from a cell beside, zero of others.
     pub off: f64,
+    /// Normal of the surface around as the places there tell it, without the points of this one; the place's own where they tell none.
+    pub normal: Vector3<f64>,
     /// Whether the surface is flat around the place, and no other one meets it there.
     pub is_flat: bool,
     /// Whether the places around lie on one surface.
@@ -121,18 +123,24 @@ fn bend<'a>(
     let by_curvature = Vector3::new(0.5 * moments[0], moments[1], 0.5 * moments[2]);
     let around = solve(&rows, deviations, CONTINUES);
     let goes_on = around.is_some();
-    let off = around.filter(|_| is_weak).map_or(0.0, |(solution, covariance)| {
+    let (height, off) = around.map_or((0.0, 0.0), |(solution, covariance)| {
         let own = place.own_variance() / (voxel_m * voxel_m);
-        solution[0] / (covariance[(0, 0)] + own).sqrt()
+        (solution[0], solution[0] / (covariance[(0, 0)] + own).sqrt())
     });
-    let variance = by_curvature.norm_squared() * (BEND * voxel_m).powi(2);
-    let unknown = Bend { above_m: 0.0, variance, off, is_flat: false, goes_on };
-    solve(&rows, deviations, BEND).map_or(unknown, |(solution, covariance)| {
+    // At an edge, the mean of two surfaces: where it is off what goes on, it may be off by as much.
+    let leaves = if off.abs() > deviations { height * height } else { 0.0 };
+    let off = if is_weak { off } else { 0.0 };
+    let variance = by_curvature.norm_squared() * (BEND * BEND);
+    let unknown =
+        Bend { above_m: 0.0, variance: variance + leaves, off, normal: place.normal, is_flat: false, goes_on };
+    let bend = solve(&rows, deviations, BEND).map_or(unknown, |(solution, covariance)| {
         let above = by_curvature.dot(&solution.fixed_rows::<3>(3));
         let variance = by_curvature.dot(&(covariance.fixed_view::<3, 3>(3, 3) * by_curvature));
-        let is_flat = above.abs() < FLAT && variance < FLAT * FLAT;
-        Bend { above_m: above * voxel_m, variance: variance * voxel_m * voxel_m, off, is_flat, goes_on }
-    })
+        let normal = (place.normal - s * solution[1] - t * solution[2]).normalize();
+        let is_flat = leaves == 0.0 && above.abs() < FLAT && variance < FLAT * FLAT;
+        Bend { above_m: above * voxel_m, variance: variance + leaves, off, normal, is_flat, goes_on }
+    });
+    Bend { variance: bend.variance * voxel_m * voxel_m, ..bend }
 }
 
 /// Height, inclinations and curvatures from neighbours, in cells; `None` where they do not lie on such a surface.

@@ -19,11 +19,6 @@ use crate::surfels::{Estimate, FrameSums, Gathered, Spread, bends, estimate, run
 /// Multiplications that the equations may take, a second or two of one processor. Places beyond are left out evenly: the
 /// common errors are then known a little less well, and as well as stated.
 const MOST_PRODUCTS: f64 = 3e9;
-/// Part of what places tell of common errors that is believed: what no source states is alike at places beside each other, and these are
-/// taken as independent. Residuals over blocks of eight cells have 1.4 to 2.3 times the variance of as many independent ones in frames of a
-/// Kinect, 1.2 to 1.9 times in simulated rooms. With all of it, two of 54 such frames are set apart and walls are half as thick again; squared errors of
-/// common errors in simulated rooms over their variances are 1.04 with all and 0.64 with this.
-const TRUST: f64 = 0.4;
 /// Parts that are summed up side by side; fixed, as it decides the order of the sums.
 const PARTS: usize = 8;
 /// Probability that a place of which all frames see the same is left out of the equations once they are solved. Larger ones waste
@@ -113,22 +108,24 @@ pub(crate) fn ties(
 }
 
 impl Equations {
-    /// Of those places that fit together where the common errors have these values.
-    pub fn new(ties: &Ties, size: usize, values: Option<&DVector<f64>>) -> Self {
+    /// Of those places that fit together where the common errors have these values; they count by so much.
+    pub fn new(ties: &Ties, size: usize, values: Option<&DVector<f64>>, trust: f64) -> Self {
         let nothing = || Self { normal: DMatrix::zeros(size, size), right: DVector::zeros(size) };
         let parts: Vec<Self> = ties
             .par_chunks(ties.len().div_ceil(PARTS).max(1))
             .map(|part| {
                 let mut sum = nothing();
-                let fitting = part.iter().filter(|(place, rows)| values.is_none_or(|values| fits(place, rows, values)));
+                let fitting = part.iter().filter(|(place, rows)| {
+                    values.is_none_or(|values| residuals(place, rows, values).is_some_and(|sums| fits(place, &sums)))
+                });
                 fitting.for_each(|(place, rows)| sum.add(place, rows));
                 sum
             })
             .collect();
         let mut all = nothing();
         for part in parts {
-            all.normal += part.normal * TRUST;
-            all.right += part.right * TRUST;
+            all.normal += part.normal * trust;
+            all.right += part.right * trust;
         }
         all
     }
@@ -169,8 +166,15 @@ impl Equations {
 
 /// Whether all frames see a place at one height, common errors of these values taken off. Beside edges that nothing shows,
 /// frames do not, and thousands of places would make a small error of each a certain one of the poses.
-fn fits(place: &Estimate, rows: &[Row], values: &DVector<f64>) -> bool {
+pub(super) fn fits(place: &Estimate, residuals: &[f64]) -> bool {
     static DEVIATIONS: LazyLock<f64> = LazyLock::new(|| Distribution::Normal.upper_quantile(LEVEL));
+    let square = |(frame, sum): (&FrameSums, &f64)| sum * sum / frame.normal[(0, 0)];
+    let found: f64 = place.frames.iter().zip(residuals).map(square).sum();
+    found <= largest_sum(residuals.len() as f64 - 1.0, *DEVIATIONS)
+}
+
+/// For each frame the weighted sum of its heights over the plane of all, common errors of these values taken off.
+pub(super) fn residuals(place: &Estimate, rows: &[Row], values: &DVector<f64>) -> Option<Vec<f64>> {
     let rights: Vec<Vector3<f64>> = place
         .frames
         .iter()
@@ -182,12 +186,7 @@ fn fits(place: &Estimate, rows: &[Row], values: &DVector<f64>) -> bool {
         .collect();
     let prior = Matrix3::from_diagonal(&Vector3::new(0.0, TILT, TILT));
     let normal = place.frames.iter().map(|f| f.normal).sum::<Matrix3<f64>>() + prior;
-    let Some(inverse) = normal.try_inverse() else { return false };
-    let plane = inverse * rights.iter().sum::<Vector3<f64>>();
-    let square = |(frame, right): (&FrameSums, &Vector3<f64>)| {
-        let mean = right[0] - frame.normal.row(0).transpose().dot(&plane);
-        mean * mean / frame.normal[(0, 0)]
-    };
-    let found: f64 = place.frames.iter().zip(&rights).map(square).sum();
-    found <= largest_sum(rights.len() as f64 - 1.0, *DEVIATIONS)
+    let plane = normal.try_inverse()? * rights.iter().sum::<Vector3<f64>>();
+    let sum = |(frame, right): (&FrameSums, &Vector3<f64>)| right[0] - frame.normal.row(0).transpose().dot(&plane);
+    Some(place.frames.iter().zip(&rights).map(sum).collect())
 }

@@ -10,6 +10,7 @@ use statistics::{Distribution, holm, upper_median};
 use super::equations::{Equations, ties};
 use super::posterior::{Posterior, posterior};
 use super::shared_error::shared_error;
+use super::trust::{AT_FIRST, trust};
 use crate::fuse::Task;
 use crate::input::{Observations, Registered, derivatives};
 use crate::lattice::Lattice;
@@ -91,15 +92,17 @@ pub(crate) fn condition(
         let seeds = seeds(patches, lattice, &layers, options.gate());
         let gathered = gather(observations, patches, &seeds, &layers, options.gate());
         let ties = ties(&gathered, observations, errors, common)?;
-        let solve = |values: Option<&DVector<f64>>| {
-            let mut equations = Equations::new(&ties, common.errors().len(), values);
+        let solve = |values: Option<&DVector<f64>>, trust: f64| {
+            let mut equations = Equations::new(&ties, common.errors().len(), values, trust);
             equations.right += &equations.normal * &before.values;
             let (prior, shared) = shared_error(options.shared_error, common, &equations)?;
             Ok::<_, Error>((posterior(&prior, &equations)?, shared))
         };
-        let (mut posterior, mut shared) = solve(None)?;
-        for _ in 0..ROUNDS {
-            (posterior, shared) = solve(Some(&(&posterior.values - &before.values)))?;
+        let (mut posterior, mut shared) = solve(None, AT_FIRST)?;
+        for round in 1..=ROUNDS {
+            let values = &posterior.values - &before.values;
+            let trust = if round < ROUNDS { AT_FIRST } else { trust(&ties, &values, lattice.size_m) };
+            (posterior, shared) = solve(Some(&values), trust)?;
         }
         let expected = if shared.is_some() { usual(&stations, &posterior, common.covariance()) } else { 1.0 };
         let p_values: Vec<f64> =

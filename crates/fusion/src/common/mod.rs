@@ -7,6 +7,7 @@ mod posterior;
 mod rows;
 mod shared_error;
 mod split;
+mod trust;
 
 pub(crate) use disagreement::{Squares, variance_factors};
 pub(crate) use isolate::{Conditioned, condition};

@@ -130,28 +130,34 @@ const FLAGS: usize = 32;
 
 #[inline(always)]
 fn scale_rays(rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
-    let (points, last_points) = points.as_chunks_mut::<LANES>();
-    let (rays, last_rays) = rays.as_chunks::<LANES>();
-    let (ranges, last_ranges) = ranges.as_chunks::<LANES>();
-    for ((points, rays), ranges) in points.iter_mut().zip(rays).zip(ranges) {
-        scale::<LANES>(rays, ranges, points);
+    let whole = ranges.len() / LANES * LANES;
+    for start in (0..whole).step_by(LANES) {
+        scale::<LANES>(start, rays, ranges, points);
     }
-    for ((point, ray), range) in last_points.iter_mut().zip(last_rays).zip(last_ranges) {
-        scale::<1>(&[*ray], &[*range], std::array::from_mut(point));
+    for start in whole..ranges.len() {
+        scale::<1>(start, rays, ranges, points);
     }
 }
 
+/// `L` pixels from `start` on, coordinates in the order in which they lie. Places are looked up block by block: chunks that need no
+/// look are put side by side by the compiler, which gathers and scatters each coordinate then. Points are written when all are found:
+/// rays that they might lie over would be taken one coordinate at a time.
 #[inline(always)]
-fn scale<const L: usize>(rays: &[[f64; 3]; L], ranges: &[f32; L], points: &mut [[f64; 3]; L]) {
-    let mut known = [f32::NAN; L];
+fn scale<const L: usize>(start: usize, rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
+    let (Some(rays), Some(ranges)) = (rays[start..].first_chunk::<L>(), ranges[start..].first_chunk::<L>()) else {
+        return;
+    };
+    let Some(points) = points[start..].first_chunk_mut::<L>() else { return };
+    let mut distances = [f32::NAN; L];
     for lane in 0..L {
-        known[lane] = if is_distance(ranges[lane]) { ranges[lane] } else { f32::NAN };
+        distances[lane] = if is_distance(ranges[lane]) { ranges[lane] } else { f32::NAN };
     }
-    for lane in 0..L {
-        for axis in 0..3 {
-            points[lane][axis] = rays[lane][axis] * f64::from(known[lane]);
-        }
+    let known = distances.map(|distance| [f64::from(distance); 3]);
+    let mut found = *rays;
+    for (found, range) in found.as_flattened_mut().iter_mut().zip(known.as_flattened()) {
+        *found *= range;
     }
+    *points = found;
 }
 
 /// Adds the flag of what is no distance.

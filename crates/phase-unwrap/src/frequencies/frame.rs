@@ -20,7 +20,7 @@ pub(crate) struct Planes<'a> {
     phases: [&'a [f32]; MAXIMUM_FREQUENCIES],
     sigmas: Option<[&'a [f32]; MAXIMUM_FREQUENCIES]>,
     mask: Option<&'a [bool]>,
-    size: (usize, usize),
+    pub(crate) size: (usize, usize),
 }
 
 /// Phases of a block of pixels, frequencies from the highest.
@@ -42,6 +42,8 @@ impl<const F: usize> Block<F> {
         let mut block =
             Self { cycles: [zero; F], weight: [zero; F], total_weight: zero, members: zero, sigma_known: [1.0; LANES] };
         let used = planes.used(start, count);
+        // A copy: where a place is chosen instead of a value, lanes are gathered one by one.
+        let assumed = lattice.assumed_sigma;
         for (position, (&frequency, interval_m)) in lattice.order.iter().zip(&lattice.intervals_m).enumerate() {
             let phase = gather(planes.phases[frequency], start, count);
             let sigma = match &planes.sigmas {
@@ -52,7 +54,7 @@ impl<const F: usize> Block<F> {
             for lane in 0..LANES {
                 let usable = if phase[lane].abs() <= f32::MAX { used[lane] } else { 0.0 };
                 let known = select((sigma[lane] > 0.0) & (sigma[lane] <= f32::MAX), 1.0, 0.0);
-                let sigma = select(known > 0.0, sigma[lane], lattice.assumed_sigma);
+                let sigma = select(known > 0.0, sigma[lane], assumed);
                 let root = per_metre / sigma.max(SMALLEST_SIGMA_RAD);
                 let weight = usable * (root * root);
                 block.cycles[position][lane] = select(usable > 0.0, phase[lane] * (1.0 / TAU as f32), 0.0);
@@ -136,10 +138,6 @@ impl<'a> Planes<'a> {
             *used = f32::from(u8::from(mask));
         }
         used
-    }
-
-    pub(crate) fn size(&self) -> (usize, usize) {
-        self.size
     }
 }
 

@@ -78,7 +78,7 @@ pub fn hypotheses(
     let lattice = Lattice::new(modulations, options)?;
     let phases = all_into_cycle(phases);
     let planes = Planes::new(&phases, modulations.len(), sigma_phase, mask)?;
-    let (width, height) = planes.size();
+    let (width, height) = planes.size;
     let blocks: Vec<_> = (0..(width * height).div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| search_chunk(&lattice, &planes, chunk * CHUNK, CHUNK.min(width * height - chunk * CHUNK), count))

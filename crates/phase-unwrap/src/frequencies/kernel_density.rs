@@ -213,12 +213,14 @@ impl RowWindow {
             for rank in 0..RANKS {
                 let ranges = self.layout.line(other, rank, col + neighbour.cols);
                 let probabilities = self.layout.line(other, RANKS + rank, col + neighbour.cols);
-                for own in 0..RANKS {
-                    for lane in 0..LANES {
+                // Hypotheses innermost: the other way round, the compiler puts them side by side, which scatters each sum.
+                for lane in 0..LANES {
+                    let share = neighbour.weight * probabilities[lane];
+                    for own in 0..RANKS {
                         let step = range_m[own][lane] - ranges[lane];
                         let inside = 1.0 - step * step * inverse[lane];
                         let inside = if inside > 0.0 { inside } else { 0.0 };
-                        density[own][lane] += neighbour.weight * probabilities[lane] * inside * inside;
+                        density[own][lane] += share * inside * inside;
                     }
                 }
             }

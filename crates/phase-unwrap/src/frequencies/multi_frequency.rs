@@ -145,7 +145,7 @@ impl MultiUnwrapper {
     ) -> Result<()> {
         let taken = all_into_cycle(phases);
         let planes = Planes::new(&taken, self.lattice.order.len(), sigma_phase, mask)?;
-        out.resize(planes.size(), phases.len());
+        out.resize(planes.size, phases.len());
         // Taken out, so that all parts can look at the rest.
         let mut windows = std::mem::take(&mut self.windows);
         let chosen = self.choose(&planes, &mut windows, out);
@@ -162,7 +162,7 @@ impl MultiUnwrapper {
 
     /// Ranges of a frame with their deviations and confidences.
     fn choose(&self, planes: &Planes<'_>, windows: &mut Vec<RowWindow>, out: &mut MultiUnwrapped) -> Result<()> {
-        let ((width, height), reach) = (planes.size(), self.reach());
+        let ((width, height), reach) = (planes.size, self.reach());
         windows.resize_with(height.div_ceil(ROWS), RowWindow::default);
         let MultiUnwrapped { range, sigma, confidence, .. } = out;
         let [range, sigma, confidence] =

@@ -42,10 +42,13 @@ pub(crate) fn for_each_chunk<T: Send>(
     let mut own = own;
     let mut jobs: [Option<(Chunk<'_>, T, Result<()>)>; MOST_CHUNKS] =
         std::array::from_fn(|_| Some((chunks.next()?, own.next()?, Ok(()))));
+    // Those that are there alone: threads share the array by halves, and the empty ones are at its end.
+    let count = jobs.iter().flatten().count();
+    let jobs = &mut jobs[..count];
     if rayon::current_num_threads() == 1 {
         jobs.iter_mut().flatten().for_each(|(chunk, own, result)| *result = work(chunk, own));
     } else {
         jobs.par_iter_mut().flatten().for_each(|(chunk, own, result)| *result = work(chunk, own));
     }
-    jobs.into_iter().flatten().try_for_each(|(_, _, result)| result)
+    jobs.iter_mut().flatten().try_for_each(|(_, _, result)| std::mem::replace(result, Ok(())))
 }

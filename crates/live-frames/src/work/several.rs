@@ -22,7 +22,7 @@ use crate::work::rows::{Chunk, for_each_chunk};
 const SYSTEMATIC_M: f64 = 0.02;
 /// A frame is cut into at most so many parts, of so many rows at least. The rows beside a part are searched for its sake as well:
 /// the more rows it has, the less of that; the more parts, the more threads they keep busy.
-const MOST_PARTS: usize = 16;
+const MOST_PARTS: usize = 32;
 const LEAST_ROWS: usize = 16;
 
 /// What is kept from frame to frame.

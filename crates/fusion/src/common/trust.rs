@@ -7,7 +7,7 @@ use nalgebra::DVector;
 
 use super::equations::{Ties, fits, residuals};
 
-/// Part that is believed until it is known. Poses that follow what is alike hide it: with all of it, two of 54 frames of a Kinect are set
+/// Part that is believed until it is known. Poses that follow what is alike hide it: with all of it, two of 56 frames of a Kinect are set
 /// apart by it, and far walls are half as thick again.
 pub(super) const AT_FIRST: f64 = 0.4;
 /// Width of blocks, cells. Of two, half of it is missed; of eight, poses follow what is alike, and it shows less.

@@ -33,7 +33,10 @@ pub(super) fn trust(ties: &Ties, values: &DVector<f64>, voxel_m: f64) -> f64 {
         let (sum, expected) = block.iter().fold((0.0, 0.0), |(sum, all), (_, own, by)| (sum + own, all + by));
         (sum * sum, expected)
     };
-    let blocks = parts.chunk_by(|a, b| a.0 == b.0).map(of_block);
-    let (found, expected) = blocks.fold((0.0, 0.0), |all: (f64, f64), next| (all.0 + next.0, all.1 + next.1));
+    let mut blocks: Vec<(f64, f64)> = parts.chunk_by(|a, b| a.0 == b.0).map(of_block).collect();
+    // The order of blocks is that of the numbers of frames, which the caller chose; the sum does not know it.
+    blocks.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let (found, expected) =
+        blocks.into_iter().fold((0.0, 0.0), |all: (f64, f64), next| (all.0 + next.0, all.1 + next.1));
     if found > EXPECTED * expected { EXPECTED * expected / found } else { 1.0 }
 }

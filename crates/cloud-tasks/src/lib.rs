@@ -9,6 +9,7 @@ mod measured;
 mod plan;
 mod request;
 mod result;
+mod seen;
 mod summary;
 
 pub use commands;

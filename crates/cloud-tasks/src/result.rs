@@ -16,6 +16,7 @@ use range_io::ron_text;
 
 use crate::fused_result::fused_from;
 use crate::plan::request;
+use crate::seen::fits_its_frames;
 
 /// The cloud's file in a result.
 pub(crate) const CLOUD: &str = "cloud.ply";
@@ -43,6 +44,8 @@ pub(crate) struct ResultCloud {
     pub(crate) flags: Option<Vec<u16>>,
     /// The image of a camera whose frames share an error that no calibration has: its depths come from a pattern or from two images.
     depth_image: Option<ImageFormat>,
+    /// Whether it is known what the cameras see.
+    pub(crate) has_camera: bool,
 }
 
 /// What each point has for itself, and how it moves.
@@ -100,7 +103,11 @@ impl ResultCloud {
         }
         let not_in_it = errors.not_in_it;
         let views = errors.frames.into_iter().map(|frame| frame.view).collect();
-        Ok(Self { not_in_it, views, depth_image, ..Self::new(file, stations, common, errors.calibration) })
+        let has_camera = errors.calibration.is_some();
+        let alone = Self::new(file, stations, common, errors.calibration);
+        let read = Self { not_in_it, views, depth_image, has_camera, ..alone };
+        fits_its_frames(&read).map_err(|wrong| request(format!("{}: {wrong}", path.display())))?;
+        Ok(read)
     }
 
     fn new(file: CloudFile, stations: Vec<StationErrors>, common: CommonErrors, calibration: Option<String>) -> Self {
@@ -125,6 +132,7 @@ impl ResultCloud {
             views: Vec::new(),
             flags: file.flags,
             depth_image: None,
+            has_camera: false,
         }
     }
 

@@ -137,6 +137,9 @@ fn many_surfaces_that_cannot_both_be_there_are_a_doubt() {
         point.z += 0.2;
     }
     folder.write_cloud(&[]);
+    let mut errors = folder.common_errors();
+    errors.frames[1].position_m[2] += 0.2;
+    folder.write_errors(&errors);
     let summary = fused(&folder).unwrap();
     assert!(summary.contradicted_points * 20 > summary.fused_points, "{}", summary.contradicted_points);
     // Three others saw through what one saw.
@@ -173,6 +176,12 @@ fn what_cannot_be_fused_is_refused_by_name() {
     folder.write_cloud(&[]);
     let found = said(&folder, &asked, Failure::Usage);
     assert!(found.contains("millimetres") && found.contains("common_errors.ron"), "{found}");
+    for (point, metre) in folder.survey.points.iter_mut().zip(&metre) {
+        point.coords = metre.coords.yxz();
+    }
+    folder.write_cloud(&[]);
+    let found = said(&folder, &asked, Failure::Usage);
+    assert!(found.contains("its camera cannot see them") && found.contains("columns exchanged"), "{found}");
     folder.survey.points = metre;
     let all: Vec<usize> = (0..folder.survey.points.len()).collect();
     folder.write_cloud(&all);

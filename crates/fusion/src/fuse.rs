@@ -174,7 +174,7 @@ impl Task<'_> {
             .map(|at| {
                 let place = &gathered.estimates[at];
                 let amplitude = amplitude(self.input, &gathered.members[at], observations);
-                let shares = shares(place, &rows[at], common);
+                let shares = shares(place, bends[at].left, &rows[at], common);
                 surfel(place, self.options.voxel_m, bends[at], shares, factors[at], amplitude)
             })
             .collect();
@@ -198,11 +198,11 @@ fn surfel(place: &Estimate, voxel_m: f64, bend: Bend, shares: Shares, variance_f
     }
 }
 
-/// The variance of a place's height by sources; of what two have in common each takes half.
-fn shares(place: &Estimate, row: &Row, common: &CommonErrors) -> Shares {
+/// The variance of a place's height by sources, with the part of its own that tests have left; of what two have in common each takes half.
+fn shares(place: &Estimate, left: f64, row: &Row, common: &CommonErrors) -> Shares {
     let mut shares = Shares::default();
-    shares.parts[Source::Noise as usize] = place.noise_variance;
-    shares.parts[Source::Sensor as usize] = place.sensor_variance;
+    shares.parts[Source::Noise as usize] = place.noise_variance * left;
+    shares.parts[Source::Sensor as usize] = place.sensor_variance * left;
     for (column, by) in row {
         let source = common.errors()[*column as usize].source;
         shares.parts[source as usize] += form(&vec![(*column, *by)], row, common.covariance());

@@ -128,6 +128,15 @@ impl StationErrors {
         (point - self.world_from_camera.translation.vector).coords.normalize()
     }
 
+    /// Whether a point lies in the station's image, or at most this many pixels beside it.
+    pub fn sees(&self, point: &Point3<f64>, beside_px: f64) -> bool {
+        let Ok(pixel) = self.camera.project(&self.world_from_camera.inverse_transform_point(point)) else {
+            return false;
+        };
+        let size = [self.camera.format.width, self.camera.format.height];
+        pixel.iter().zip(size).all(|(at, size)| *at >= -0.5 - beside_px && *at <= size as f64 - 0.5 + beside_px)
+    }
+
     /// Covariance of a point whose range has this standard deviation, square metre, world axes, without what its neighbourhood
     /// shares of it.
     pub fn noise(&self, point: &Point3<f64>, sigma_range_m: f64) -> Matrix3<f64> {

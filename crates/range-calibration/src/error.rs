@@ -1,5 +1,7 @@
 use thiserror::Error;
 
+use crate::surfaces::HeldTerm;
+
 /// Why a calibration of ranges gave no trustworthy result.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
@@ -139,12 +141,14 @@ pub enum Error {
     #[error(
         "the stations did not settle in {} rounds without and {} rounds with the terms: a direction is held by too few \
          surfaces, or the lens is another camera's, or stations or their poses are exchanged; give better approximate poses, or \
-         stations that see more furniture across it, and look at the lens and at which frame and pose belong to which station",
-        .rounds[0], .rounds[1]
+         stations that see more furniture across it, and look at the lens and at which frame and pose belong to which station{}",
+        .rounds[0], .rounds[1], left_open(.held)
     )]
     SurfacesNotSettled {
         /// Rounds with the known model, and with the terms as unknowns.
         rounds: [usize; 2],
+        /// Terms that were held by then, as the surfaces do not determine them.
+        held: Vec<HeldTerm>,
     },
     /// The stations could not be registered.
     #[error("registration, {station}: {reason}")]
@@ -195,6 +199,16 @@ pub enum Error {
     /// The frame is not valid.
     #[error(transparent)]
     Image(#[from] range_image::Error),
+}
+
+/// What the surfaces left open, as the end of a sentence.
+fn left_open(held: &[HeldTerm]) -> String {
+    let open = held.iter().filter(|term| term.sigma_m.is_finite());
+    let names: Vec<String> = open.map(|term| format!("{} ({:.0} mm)", term.name, 1e3 * term.sigma_m)).collect();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!("; already held, since these surfaces leave them open: {}", names.join(", "))
 }
 
 /// Result with this crate's [`enum@Error`].

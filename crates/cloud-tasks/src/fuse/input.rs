@@ -3,16 +3,10 @@
 use commands::{Error, Result, json};
 use nalgebra::{Matrix3, Point3, Vector3};
 use point_uncertainty::PointErrors;
-use statistics::upper_median;
 
 use super::summary::FuseSummary;
 use crate::request::FuseRequest;
 use crate::result::ResultCloud;
-
-/// Median distance of points from their perspective centres beyond which they are not in metre. Range cameras end far below;
-/// a room in millimetres begins above. `inspect` takes the same limit. A smaller one refuses long ranges, a larger one lets
-/// small objects in millimetres through to what cells and noise say of them.
-const LONGEST_RANGE_M: f64 = 100.0;
 
 /// Points without flag that have a position and a noise.
 pub(crate) struct Usable<'a> {
@@ -45,32 +39,14 @@ impl<'a> Usable<'a> {
             cloud.points[*index].iter().all(|value| value.is_finite()) && variance.is_finite()
         };
         let indices: Vec<usize> = cloud.usable.iter().copied().filter(is_known).collect();
-        let usable = Self {
+        Ok(Self {
             points: indices.iter().map(|index| cloud.points[*index]).collect(),
             frames: indices.iter().map(|index| errors.frame[*index]).collect(),
             centres: errors.stations.iter().map(|of| of.world_from_camera().translation.vector.into()).collect(),
             amplitudes: indices.iter().map(|index| errors.amplitude(*index)).collect(),
             cloud,
             indices,
-        };
-        usable.in_metre(asked)?;
-        Ok(usable)
-    }
-
-    /// Refuses coordinates in another unit than the places of the frames.
-    fn in_metre(&self, asked: &FuseRequest) -> Result<()> {
-        let points = self.points.iter().zip(&self.frames);
-        let mut ranges: Vec<f64> =
-            points.map(|(point, frame)| (point - self.centres[*frame as usize]).norm()).collect();
-        let median = upper_median(&mut ranges);
-        if median > LONGEST_RANGE_M {
-            return Err(slip(format!(
-                "{}: half of the points of cloud.ply are further than {median:.0} m from the places of their frames in \
-                 common_errors.ron, expected at most {LONGEST_RANGE_M} m: are the coordinates in millimetres? Give them in metre",
-                asked.result.display()
-            )));
-        }
-        Ok(())
+        })
     }
 
     /// The points with what was found of their common errors taken off.

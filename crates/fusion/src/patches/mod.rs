@@ -14,7 +14,7 @@ use crate::input::{NO_NEIGHBOURHOOD, Observations, derivatives};
 use crate::lattice::{Runs, neighbour, neighbours};
 use crate::small::{self, Symmetric};
 use moments::Moments;
-pub(crate) use moments::{LEAST_FACING, Plane, largest_sum};
+pub(crate) use moments::{LEAST_FACING, Plane, largest_sum, variance_within};
 pub(crate) use places::{ONE_SURFACE, Seed, seeds};
 
 /// What one frame saw in one cell.

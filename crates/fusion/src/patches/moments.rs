@@ -142,3 +142,10 @@ pub(crate) fn largest_sum(dof: f64, deviations: f64) -> f64 {
     let part = 2.0 / (9.0 * dof);
     dof * (1.0 - part + deviations * part.sqrt()).powi(3)
 }
+
+/// Part of the variance of a normal variable that is left where none beyond `limit` standard deviations is kept: that of a truncated one,
+/// by its chi-squared distributions of three degrees of freedom and one.
+pub(crate) fn variance_within(limit: f64) -> f64 {
+    let within = |dof: f64| Distribution::ChiSquared { dof }.cumulative(limit * limit);
+    within(3.0) / within(1.0)
+}

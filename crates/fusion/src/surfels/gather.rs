@@ -5,15 +5,12 @@ use rayon::prelude::*;
 use statistics::Distribution;
 
 use super::assign::{Owner, Places, members, owners};
-use super::curvature::Bend;
+use super::curvature::{Bend, largest_off};
 use super::estimate::{Alone, Estimate, estimate};
 use crate::input::Observations;
 use crate::patches::{Patches, Seed};
 use crate::small;
 use crate::{Error, FusionOptions, Result};
-
-/// Probability that a place with a weak plane that goes on the surface around it is given up.
-const CONTINUES: f64 = 0.05;
 
 /// Fewest points of a place with a weak plane: they must tell whether it is theirs.
 const FEWEST_OF_WEAK: usize = 2;
@@ -106,7 +103,7 @@ fn renumbered(owner: Owner, number: &[u32]) -> Owner {
 /// Which places have their points on a plane.
 pub(crate) fn is_even(gathered: &Gathered, around: &[Bend], options: &FusionOptions) -> Vec<bool> {
     let deviations = Distribution::Normal.upper_quantile(options.outlier_level);
-    let goes_on = Distribution::Normal.critical(CONTINUES);
+    let goes_on = largest_off();
     let is_plane =
         |(place, bend): (&Estimate, &Bend)| place.is_plane(deviations, options.voxel_m) && bend.off.abs() <= goes_on;
     gathered.estimates.iter().zip(around).map(is_plane).collect()

@@ -69,7 +69,7 @@ pub fn calibrate_surfaces(
     let (after, shared) = network.estimate(&mut model, &mut held, &before)?;
     // With the terms left out, stations may go back and forth between what these bend: only how they end counts.
     if !after.settled {
-        return Err(Error::SurfacesNotSettled { rounds: [before.rounds, after.rounds] });
+        return Err(Error::SurfacesNotSettled { rounds: [before.rounds, after.rounds], held });
     }
     let camera = model.camera_at(&shared.values);
     Estimate { known, camera, model: &model, shared, held }.outcome(before, after)

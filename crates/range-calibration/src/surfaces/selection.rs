@@ -18,6 +18,18 @@ pub struct HeldTerm {
     pub sigma_m: f64,
 }
 
+impl std::fmt::Display for HeldTerm {
+    /// Which term is held, and why.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.sigma_m.is_finite() {
+            let millimetres = 1e3 * self.sigma_m;
+            write!(f, "{} is held: these surfaces leave {} open ({millimetres:.1} mm)", self.name, self.combination)
+        } else {
+            write!(f, "{} is held: {}", self.name, self.combination)
+        }
+    }
+}
+
 /// For each combination that is known to more than `limit_m`, the term with the largest part in it, a parameter once.
 pub(super) fn undetermined(shared: &SharedParameters, effects: &[f64], limit_m: f64) -> Vec<(usize, HeldTerm)> {
     let count = effects.len();

@@ -193,14 +193,7 @@ fn diagnosis(found: &SurfaceCalibration) -> Vec<String> {
         "surfaces seen from two stations lie {after:.2} mm apart (root mean square), {before:.2} mm before the terms were \
          estimated"
     );
-    let held = found.held.iter().map(|term| {
-        if term.sigma_m.is_finite() {
-            let millimetres = 1e3 * term.sigma_m;
-            format!("{} is held: these surfaces leave {} open ({millimetres:.1} mm)", term.name, term.combination)
-        } else {
-            format!("{} is held: {}", term.name, term.combination)
-        }
-    });
+    let held = found.held.iter().map(ToString::to_string);
     std::iter::once(seen).chain(held).collect()
 }
 

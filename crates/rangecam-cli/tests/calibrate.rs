@@ -97,3 +97,44 @@ fn a_refusal_is_a_failure_with_a_summary() {
     assert_eq!(printed["converged"], false);
     assert!(printed["diagnosis"][0].as_str().unwrap().len() > 20);
 }
+
+/// Two stations of an SR4000, 0.3 m apart along the line of sight.
+fn two_real_stations(folder: &Path) -> Option<()> {
+    let captures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/real/sr4000_steps");
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/surveys/sr4000_steps/survey.ron");
+    if !captures.is_dir() {
+        println!("skipped: {} is not there", captures.display());
+        return None;
+    }
+    for file in std::fs::read_dir(&captures).unwrap().map(|entry| entry.unwrap().path()) {
+        if file.extension().is_some_and(|ending| ending == "npz") {
+            std::fs::copy(&file, folder.join(file.file_name().unwrap())).unwrap();
+        }
+    }
+    let survey = std::fs::read_to_string(fixture).unwrap().replace("../../../../shared/real/sr4000_steps/", "");
+    std::fs::write(folder.join("survey.ron"), survey).unwrap();
+    let stations = "station,x,y,z,omega,phi,kappa\nY1,0,0,0,0,0,0\nY2,0,0,-0.3,0,0,0\n";
+    std::fs::write(folder.join("stations.csv"), stations).unwrap();
+    Some(())
+}
+
+#[test]
+fn what_two_real_stations_leave_open_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let (survey, out) = (folder.path().join("survey"), folder.path().join("out"));
+    std::fs::create_dir(&survey).unwrap();
+    let Some(()) = two_real_stations(&survey) else { return };
+    let calibrate = |terms: &str| {
+        let (survey, out) = (survey.to_str().unwrap(), out.to_str().unwrap());
+        rangecam(&["calibrate", survey, "--method", "surfaces", "--terms", terms, "--out", out, "--quiet"])
+    };
+    let waves = calibrate("d2,d3,d4,d5,d6,d7");
+    assert!(waves.status.success(), "{}", text(&waves.stderr));
+    let summary = std::fs::read_to_string(out.join("summary.json")).unwrap();
+    assert!(summary.contains("d2 is held: these surfaces leave") && summary.contains("d6 is held"), "{summary}");
+    assert!(!summary.contains("d7 is held"), "{summary}");
+    let offset = calibrate("d0");
+    assert_eq!(offset.status.code(), Some(3));
+    assert!(text(&offset.stderr).contains("do not determine `d0`"), "{}", text(&offset.stderr));
+    assert_eq!(calibrate("auto").status.code(), Some(3));
+}

@@ -6,7 +6,7 @@ use std::f32::consts::TAU;
 
 use range_image::with_wide_registers;
 
-use crate::carried::pixels::{HELD, LANES, OPEN, RIM, apart, is_gentle};
+use crate::carried::pixels::{HELD, LANES, MASKED, OPEN, RIM, apart, is_gentle};
 use phase_unwrap::{wrap_step, wrapped};
 
 /// Sweeps forth and back over the pixels without a count. What is revealed at the edge of a surface is reached in the first;
@@ -51,12 +51,13 @@ impl Attaching<'_> {
         with_wide_registers(
             #[inline(always)]
             || {
-                for block in blocks.iter_mut() {
+                for block in blocks.iter_mut().filter(|block| block.open != 0) {
+                    let steps = self.steps(block);
                     let mut left = block.open;
                     while left != 0 {
                         let place = left.trailing_zeros();
                         left &= left - 1;
-                        self.attach_in(block, place);
+                        self.attach(block, place, &steps);
                     }
                 }
             },
@@ -68,25 +69,17 @@ impl Attaching<'_> {
         with_wide_registers(
             #[inline(always)]
             || {
-                for block in blocks.iter_mut().rev() {
+                for block in blocks.iter_mut().rev().filter(|block| block.open != 0) {
+                    let steps = self.steps(block);
                     let mut left = block.open;
                     while left != 0 {
                         let place = left.ilog2();
                         left ^= 1 << place;
-                        self.attach_in(block, place);
+                        self.attach(block, place, &steps);
                     }
                 }
             },
         );
-    }
-
-    #[inline(always)]
-    fn attach_in(&mut self, block: &mut Block, place: u32) {
-        let (pixel, col) = ((block.first + place) as usize, (block.col + place) as usize);
-        if self.attach(pixel, col) {
-            block.open ^= 1 << place;
-            block.attached |= 1 << place;
-        }
     }
 
     /// The other sweeps, and the setting aside: pixels attached at edges have a count for this frame only. Gives the number of those
@@ -111,13 +104,8 @@ impl Attaching<'_> {
             #[inline(always)]
             || {
                 for block in blocks.iter() {
-                    let mut left = block.attached;
-                    while left != 0 {
-                        let place = left.trailing_zeros();
-                        left &= left - 1;
-                        let at_edge = self.set_aside((block.first + place) as usize, (block.col + place) as usize);
-                        counts[1] += usize::from(at_edge);
-                    }
+                    let at_edge = if block.attached == 0 { 0 } else { self.set_aside(block) };
+                    counts[1] += at_edge.count_ones() as usize;
                     counts[0] += block.attached.count_ones() as usize;
                 }
             },
@@ -143,55 +131,92 @@ impl Attaching<'_> {
         }
     }
 
-    /// Gives an open pixel the count that continues the neighbour with the smallest step among those that hold on the same surface;
-    /// whether there is one.
+    /// Sizes of the steps to the pixels above, to the left, to the right and below where those may lie on the same surface: as patterns
+    /// of bits, which sort as the steps do; all bits where they may not.
     #[inline(always)]
-    fn attach(&mut self, pixel: usize, col: usize) -> bool {
-        let (own, brightness) = (self.phase[pixel], self.amplitude[pixel]);
-        let sides = self.sides(pixel, col);
-        let (phase, amplitude) = (sides.map(|side| self.phase[side]), sides.map(|side| self.amplitude[side]));
-        let state = sides.map(|side| u32::from(self.state[side]));
-        // Steps as patterns of bits, which sort as they do; all bits where a neighbour does not hold.
-        let mut steps = [u32::MAX; 4];
+    fn steps(&self, block: &Block) -> [[u32; LANES]; 4] {
+        let own = [here(self.phase, block.first as usize), here(self.amplitude, block.first as usize)];
+        let mut steps = [[u32::MAX; LANES]; 4];
+        for (steps, side) in steps.iter_mut().zip(self.sides(block)) {
+            let Some(side) = side else { continue };
+            let other = [here(self.phase, side), here(self.amplitude, side)];
+            for i in 0..LANES {
+                let step = wrapped(own[0][i] - other[0][i]).abs();
+                let gentle = is_gentle(step, [other[1][i], own[1][i]], self.noise2);
+                steps[i] = if gentle { step.to_bits() } else { u32::MAX };
+            }
+        }
+        if block.col == 0 {
+            steps[1][0] = u32::MAX;
+        }
+        if let Some(last) = self.last(block) {
+            steps[2][last] = u32::MAX;
+        }
+        steps
+    }
+
+    /// Gives an open pixel of a block the count that continues the neighbour with the smallest step among those that hold on the same
+    /// surface, if there is one.
+    #[inline(always)]
+    fn attach(&mut self, block: &mut Block, place: u32, steps: &[[u32; LANES]; 4]) {
+        let (pixel, place) = ((block.first + place) as usize, place as usize);
+        let sides = [pixel.wrapping_sub(self.width), pixel.wrapping_sub(1), pixel + 1, pixel + self.width];
+        let (mut least, mut other) = (u32::MAX, pixel);
         for i in 0..4 {
-            let step = wrapped(own - phase[i]).abs();
-            let holds = (state[i] == u32::from(HELD)) & is_gentle(step, [amplitude[i], brightness], self.noise2);
-            steps[i] = if holds { step.to_bits() } else { u32::MAX };
+            let holds = self.state.get(sides[i]).is_some_and(|state| *state == HELD);
+            let step = if holds { steps[i][place] } else { u32::MAX };
+            other = if step < least { sides[i] } else { other };
+            least = least.min(step);
         }
-        let least = steps[0].min(steps[1]).min(steps[2].min(steps[3]));
         if least == u32::MAX {
-            return false;
+            return;
         }
-        let other = sides[steps.iter().position(|step| *step == least).unwrap_or(0)];
+        let own = self.phase[pixel];
         let wraps = self.wraps[other] + wrap_step(self.phase[other], own);
         if !(0..=self.maximum_wraps).contains(&wraps) {
-            return false;
+            return;
         }
         self.wraps[pixel] = wraps;
         self.confidence[pixel] = self.confidence[other];
         self.doubts[pixel] = self.doubts[other];
         self.unwrapped[pixel] = own + TAU * wraps as f32;
-        self.before[pixel] = brightness;
+        self.before[pixel] = self.amplitude[pixel];
         self.state[pixel] = HELD;
-        true
+        block.open ^= 1 << place;
+        block.attached |= 1 << place;
     }
 
     /// A pixel with a neighbour on another surface may belong to that one, or to neither, as slivers and mixed pixels do: it has
-    /// its count for this frame, and says that it is a guess.
+    /// its count for this frame, and says that it is a guess. Gives those of the attached ones of a block that do, a bit each.
     #[inline(always)]
-    fn set_aside(&mut self, pixel: usize, col: usize) -> bool {
-        let (brightness, sides) = (self.amplitude[pixel], self.sides(pixel, col));
-        let own = self.phase[pixel] + TAU * self.wraps[pixel] as f32;
-        let (phase, amplitude) = (sides.map(|side| self.phase[side]), sides.map(|side| self.amplitude[side]));
-        let (state, wraps) = (sides.map(|side| u32::from(self.state[side])), sides.map(|side| self.wraps[side]));
-        let mut edges = [0; 4];
-        for i in 0..4 {
-            let apart = apart([own, phase[i] + TAU * wraps[i] as f32], [brightness, amplitude[i]], self.noise2);
-            let known = (state[i] == u32::from(HELD)) | (state[i] == u32::from(RIM));
-            edges[i] = u32::from((state[i] == u32::from(OPEN)) | (known & apart));
+    fn set_aside(&mut self, block: &Block) -> u32 {
+        let first = block.first as usize;
+        let (phase, brightness, wraps) =
+            (here(self.phase, first), here(self.amplitude, first), here(self.wraps, first));
+        let mut edges = [0_u32; LANES];
+        for (number, side) in self.sides(block).into_iter().enumerate() {
+            let Some(side) = side else { continue };
+            let (other, amplitude, counts) =
+                (here(self.phase, side), here(self.amplitude, side), here(self.wraps, side));
+            let mut state = here(self.state, side);
+            match (number, block.col, self.last(block)) {
+                (1, 0, _) => state[0] = MASKED,
+                (2, _, Some(last)) => state[last] = MASKED,
+                _ => {}
+            }
+            for i in 0..LANES {
+                let unwrapped = [phase[i] + TAU * wraps[i] as f32, other[i] + TAU * counts[i] as f32];
+                let apart = apart(unwrapped, [brightness[i], amplitude[i]], self.noise2);
+                let state = u32::from(state[i]);
+                let known = (state == u32::from(HELD)) | (state == u32::from(RIM));
+                edges[i] |= u32::from((state == u32::from(OPEN)) | (known & apart));
+            }
         }
-        let at_edge = edges.iter().fold(0, |any, edge| any | edge) != 0;
-        if at_edge {
+        let at_edge = edges.iter().enumerate().fold(0, |bits, (i, edge)| bits | edge << i) & block.attached;
+        let mut left = at_edge;
+        while left != 0 {
+            let pixel = first + left.trailing_zeros() as usize;
+            left &= left - 1;
             self.state[pixel] = RIM;
             self.unwrapped[pixel] = f32::NAN;
             self.confidence[pixel] = 0.0;
@@ -199,23 +224,36 @@ impl Attaching<'_> {
         at_edge
     }
 
-    /// The neighbours of a pixel: above, to the left, to the right, below; the pixel itself where the image ends.
+    /// Where the blocks above, to the left, to the right and below begin, as far as there is one.
     #[inline(always)]
-    fn sides(&self, pixel: usize, col: usize) -> [usize; 4] {
-        let (width, count) = (self.width, self.phase.len());
+    fn sides(&self, block: &Block) -> [Option<usize>; 4] {
+        let first = block.first as usize;
+        let below = first + self.width;
         [
-            if pixel >= width { pixel - width } else { pixel },
-            if col > 0 { pixel - 1 } else { pixel },
-            if col + 1 < width { pixel + 1 } else { pixel },
-            if pixel + width < count { pixel + width } else { pixel },
+            first.checked_sub(self.width),
+            first.checked_sub(1),
+            Some(first + 1),
+            Some(below).filter(|below| *below < self.phase.len()),
         ]
+    }
+
+    /// Place of the row's last pixel in a block that holds it.
+    #[inline(always)]
+    fn last(&self, block: &Block) -> Option<usize> {
+        Some(self.width - 1 - block.col as usize).filter(|last| *last < LANES)
     }
 
     /// The count that continues the neighbour with the smallest step among those that hold. The pixel itself does not hold.
     fn nearest(&self, pixel: usize) -> Option<i32> {
-        let own = self.phase[pixel];
+        let (own, col) = (self.phase[pixel], pixel % self.width);
+        let sides = [
+            pixel.checked_sub(self.width),
+            pixel.checked_sub(1).filter(|_| col > 0),
+            Some(pixel + 1).filter(|_| col + 1 < self.width),
+            Some(pixel + self.width),
+        ];
         let mut best = (f32::INFINITY, None);
-        for other in self.sides(pixel, pixel % self.width).into_iter().filter(|&other| self.state[other] == HELD) {
+        for other in sides.into_iter().flatten().filter(|&other| self.state.get(other) == Some(&HELD)) {
             let step = wrapped(own - self.phase[other]).abs();
             if step < best.0 {
                 best = (step, Some(self.wraps[other] + wrap_step(self.phase[other], own)));
@@ -223,4 +261,13 @@ impl Attaching<'_> {
         }
         best.1
     }
+}
+
+/// Values of the pixels of a block; nothing beyond the image.
+#[inline(always)]
+fn here<T: Copy + Default>(plane: &[T], first: usize) -> [T; LANES] {
+    if let Some(values) = plane.get(first..).and_then(|values| values.first_chunk()) {
+        return *values;
+    }
+    std::array::from_fn(|i| plane.get(first + i).copied().unwrap_or_default())
 }

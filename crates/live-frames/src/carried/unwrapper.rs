@@ -41,6 +41,7 @@ pub struct CarriedUnwrapper {
     blocks: Vec<Block>,
     open: Vec<u32>,
     spread: [Vec<f32>; 2],
+    settled: Vec<usize>,
     noise2: f32,
     /// Pixels that contradicted the small image when it was made last.
     doubted: usize,
@@ -137,6 +138,8 @@ impl CarriedUnwrapper {
         self.blocks.reserve(width.div_ceil(LANES) * height);
         self.open.clear();
         self.open.reserve(width * height);
+        self.settled.clear();
+        self.settled.reserve(width);
         self.coarse.resize(width, height);
     }
 
@@ -239,6 +242,7 @@ impl CarriedUnwrapper {
             confidence: self.out.confidence.as_mut_slice(),
             doubts: &mut self.doubts,
             spread: &mut self.spread,
+            settled: &mut self.settled,
             maximum_wraps: i32::from(self.options.maximum_wraps),
             minimum_confidence: self.options.minimum_confidence,
         };

@@ -89,9 +89,9 @@ impl Attaching<'_> {
         let mut before = left(blocks);
         for sweep in 1..SWEEPS {
             if sweep % 2 == 0 {
-                self.sweep(blocks)
+                self.sweep(blocks);
             } else {
-                self.sweep_back(blocks)
+                self.sweep_back(blocks);
             }
             let now = left(blocks);
             if now == before {

@@ -112,7 +112,6 @@ pub(crate) fn carry_row(row: &mut Row<'_>, first: u32, limits: Limits, blocks: &
 }
 
 /// Carries `L` pixels, counts those that are used, and gives those that fail, a bit each.
-
 #[inline(always)]
 #[allow(clippy::too_many_arguments)] // planes of one row, in the order of `Row`
 fn carry_pixels<const L: usize>(

@@ -1,11 +1,7 @@
 //! Planes tell their distance: seen from a point, a plane's range is curved by an amount that grows with the range,
 //! so the curvature of a wrapped range image says which wrap count makes walls and floors plane.
-// Only what is inlined is compiled for wide registers; loops over lanes read as their formulas.
-#![allow(clippy::inline_always, clippy::needless_range_loop)]
 
 use std::f32::consts::TAU;
-
-use range_image::with_wide_registers;
 
 use crate::ImageGeometry;
 use crate::image::surface::Surface;
@@ -24,7 +20,7 @@ const CURVATURE_ERROR: f64 = 0.15;
 /// Density, (cycles/rad^2)^-3, of the curvatures of all other surfaces, times their share of the blocks: 30 % of them,
 /// spread over +-10 cycles/rad^2 in each component. A choice on which the figures of `tests/absolute.rs` with geometry
 /// rest.
-const CURVED_DENSITY: f32 = 0.3 / 8000.0;
+const CURVED_DENSITY: f64 = 0.3 / 8000.0;
 /// Share of plane blocks. The rest of the share above.
 const PLANE_SHARE: f64 = 0.7;
 /// Blocks overlap by half in both directions, so each pixel is seen by four.
@@ -74,10 +70,10 @@ impl Planes {
     ) {
         self.sums.clear();
         self.sums.resize(forest.components * labels, 0.0);
+        self.set_mean_slopes(grid, surface, forest, geometry);
         let pixels_of = surface.phase.iter().zip(&forest.wraps);
         self.cycles.clear();
         self.cycles.extend(pixels_of.map(|(phase, wraps)| phase / TAU + *wraps as f32));
-        self.set_mean_slopes(grid, forest, geometry);
         let mut finest = 0;
         for angle in BLOCK_ANGLES {
             // Each sample stands for `spacing` pixels a side.
@@ -98,22 +94,16 @@ impl Planes {
     }
 
     /// The mean slope of each segment, which serves where no block fits: small and slender segments.
-    fn set_mean_slopes(&mut self, grid: &Grid, forest: &Forest, geometry: &ImageGeometry) {
+    fn set_mean_slopes(&mut self, grid: &Grid, surface: &Surface, forest: &Forest, geometry: &ImageGeometry) {
         let mut means = vec![[(0.0_f32, 0_u32); 2]; forest.components];
-        for start in grid.row_starts() {
-            let (mut at, labels) = (start, &forest.label[start..start + grid.width]);
-            // A segment's pixels come in runs, along which all steps together are the one from end to end.
-            for run in labels.chunk_by(|a, b| a == b) {
-                let (here, below) = (at..at + run.len(), at + grid.stride..at + grid.stride + run.len());
-                at = here.end;
-                let cycles = &self.cycles[here];
-                let (label, along) = (run[0], cycles[run.len() - 1] - cycles[0]);
-                let Some(mean) = means.get_mut(label as usize) else { continue };
-                mean[0] = (mean[0].0 + along, mean[0].1 + run.len() as u32 - 1);
-                let steps = cycles.iter().zip(&self.cycles[below.clone()]).zip(&forest.label[below]);
-                mean[1] = steps
-                    .filter(|(_, below)| **below == label)
-                    .fold(mean[1], |(sum, count), ((from, to), _)| (sum + to - from, count + 1));
+        for pixel in grid.inner().filter(|&pixel| forest.label[pixel] != NO_LABEL) {
+            let mean = &mut means[forest.label[pixel] as usize];
+            for (axis, other) in [(0, pixel + 1), (1, pixel + grid.stride)] {
+                if forest.label[other] == forest.label[pixel] {
+                    let step = (surface.phase[other] - surface.phase[pixel]) / TAU
+                        + (forest.wraps[other] - forest.wraps[pixel]) as f32;
+                    mean[axis] = (mean[axis].0 + step, mean[axis].1 + 1);
+                }
             }
         }
         let slope = |(sum, n): (f32, u32)| {
@@ -198,29 +188,20 @@ fn fit(samples: &[f64; SIDE * SIDE], pitch: f64) -> Patch {
     const S2: f64 = (SIDE * SIDE) as f64;
     let (m2, m4) = ((S2 - 1.0) / 12.0, (S2 - 1.0) * (3.0 * S2 - 7.0) / 240.0);
     let norms = [N, N * m2, N * m2, N * (m4 - m2 * m2), N * m2 * m2, N * (m4 - m2 * m2)];
-    // Polynomials of the row are summed over each column, side by side, and these of the column over all of them.
-    let [plain, slope, bend, squared] = with_wide_registers(
-        #[inline(always)]
-        || {
-            let mut sums = [[0.0; SIDE]; 4];
-            for (row, values) in samples.as_chunks::<SIDE>().0.iter().enumerate() {
-                let y = row as f64 - MIDDLE;
-                for col in 0..SIDE {
-                    sums[0][col] += values[col];
-                    sums[1][col] += y * values[col];
-                    sums[2][col] += (y * y - m2) * values[col];
-                    sums[3][col] += values[col] * values[col];
-                }
-            }
-            sums
-        },
-    );
-    let squares: f64 = squared.iter().sum();
     let mut sums = [0.0; 6];
-    for col in 0..SIDE {
-        let x = col as f64 - MIDDLE;
-        let (plain, slope) = (plain[col], slope[col]);
-        let terms = [plain, x * plain, slope, (x * x - m2) * plain, x * slope, bend[col]];
+    let mut squares = 0.0;
+    // Polynomials of the column are summed over each row, and these of the row over all of them.
+    for (row, values) in samples.chunks_exact(SIDE).enumerate() {
+        let (y, mut of_row) = (row as f64 - MIDDLE, [0.0; 3]);
+        for (col, value) in values.iter().enumerate() {
+            let x = col as f64 - MIDDLE;
+            of_row[0] += value;
+            of_row[1] += x * value;
+            of_row[2] += (x * x - m2) * value;
+            squares += value * value;
+        }
+        let [plain, slope, bend] = of_row;
+        let terms = [plain, slope, y * plain, bend, y * slope, (y * y - m2) * plain];
         sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
     }
     let explained: f64 = sums.iter().zip(norms).map(|(sum, norm)| sum * sum / norm).sum();
@@ -242,15 +223,13 @@ fn fit(samples: &[f64; SIDE * SIDE], pitch: f64) -> Patch {
 /// With `N = sqrt(1 + x^2 + y^2)` a plane has `rho = N / D`, D linear in x and y.
 fn plane_curvature(x: f64, y: f64, range: f64, gradient: [f64; 2]) -> [f64; 3] {
     let n = (1.0 + x * x + y * y).sqrt();
-    let (inverse_n, range) = (1.0 / n, range.max(1e-3));
-    let [nx, ny] = [x * inverse_n, y * inverse_n];
-    let [nxx, nxy, nyy] = [(1.0 - nx * nx) * inverse_n, -nx * ny * inverse_n, (1.0 - ny * ny) * inverse_n];
-    // Both ways, so that nothing else is divided.
-    let (inverse_range, inverse_d) = (1.0 / range, range * inverse_n);
-    let d = n * inverse_range;
-    let [dx, dy] = [(nx - gradient[0] * d) * inverse_range, (ny - gradient[1] * d) * inverse_range];
+    let [nx, ny] = [x / n, y / n];
+    let [nxx, nxy, nyy] = [(1.0 - nx * nx) / n, -nx * ny / n, (1.0 - ny * ny) / n];
+    let range = range.max(1e-3);
+    let d = n / range;
+    let [dx, dy] = [(nx - gradient[0] * d) / range, (ny - gradient[1] * d) / range];
     let second = |nab: f64, na: f64, nb: f64, da: f64, db: f64| {
-        inverse_d * (nab - inverse_d * ((na * db + nb * da) - 2.0 * n * inverse_d * da * db))
+        nab / d - (na * db + nb * da) / (d * d) + 2.0 * n * da * db / (d * d * d)
     };
     [second(nxx, nx, nx, dx, dx), second(nxy, nx, ny, dx, dy), second(nyy, ny, ny, dy, dy)]
 }
@@ -268,26 +247,24 @@ pub(crate) fn log_cosine(x: f32, y: f32, range: f32, slope: [f32; 2]) -> f32 {
 /// How likely curvatures are that are predicted for a patch; what they have in common is found once.
 struct Likelihood {
     measured: [f64; 3],
-    /// Inverse variances.
-    weight: [f64; 3],
+    variance: [f64; 3],
     /// Density, (cycles/rad^2)^-3, of a plane's curvature where it is as predicted.
-    density: f32,
+    density: f64,
 }
 
 impl Likelihood {
     fn new(patch: &Patch) -> Self {
         let variance = patch.variance.map(|variance| variance + CURVATURE_ERROR * CURVATURE_ERROR);
         let volume = std::f64::consts::TAU.powi(3) * variance.iter().product::<f64>();
-        let density = (PLANE_SHARE / volume.sqrt()) as f32;
-        Self { measured: patch.curvature, weight: variance.map(f64::recip), density }
+        Self { measured: patch.curvature, variance, density: PLANE_SHARE / volume.sqrt() }
     }
 
     /// Minus the logarithm of the density of planes and other surfaces together.
     fn cost(&self, predicted: [f64; 3]) -> f64 {
-        let parts = self.measured.iter().zip(predicted).zip(self.weight);
-        let exponent: f64 = parts.map(|((measured, predicted), weight)| (measured - predicted).powi(2) * weight).sum();
-        // A logarithm in single precision is good to a millionth of a nat, and takes half of the time.
-        f64::from(-(CURVED_DENSITY + self.density * (-0.5 * exponent as f32).exp()).ln())
+        let parts = self.measured.iter().zip(predicted).zip(self.variance);
+        let exponent: f64 =
+            parts.map(|((measured, predicted), variance)| (measured - predicted).powi(2) / variance).sum();
+        -(CURVED_DENSITY + self.density * (-0.5 * exponent).exp()).ln()
     }
 }
 

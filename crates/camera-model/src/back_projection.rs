@@ -3,6 +3,8 @@
 // planes at once.
 #![allow(clippy::inline_always, clippy::needless_bitwise_bool, clippy::needless_range_loop)]
 
+use std::ops::MulAssign;
+
 use nalgebra::{Isometry3, Point3};
 use range_image::{Flags, RangeFrame, with_wide_registers};
 use rayon::prelude::*;
@@ -94,18 +96,19 @@ impl RayTable {
     }
 
     /// [`Self::back_project`] of the pixels from `first` on (counted row by row), as many as there are ranges: for those who
-    /// work through a frame row by row. Flags are added to those that there are; allocates nothing.
+    /// work through a frame row by row. In single precision, rays included: a coordinate is good to `1.2e-7` of the range, a
+    /// micrometre at 8 m. Flags are added to those that there are; allocates nothing.
     ///
     /// Fails where the slices differ in length or reach beyond the image.
     pub fn back_project_pixels(
         &self,
         first: usize,
         range: &[f32],
-        points: &mut [[f64; 3]],
+        points: &mut [[f32; 3]],
         flags: &mut [Flags],
     ) -> Result<()> {
         let count = range.len();
-        let rays = first.checked_add(count).and_then(|end| self.directions().get(first..end));
+        let rays = first.checked_add(count).and_then(|end| self.single().get(first..end));
         let Some(rays) = rays.filter(|_| points.len() == count && flags.len() == count) else {
             let (width, height) = (self.format().width, self.format().height);
             let (found_width, found_height) = (first.saturating_add(count.max(points.len()).max(flags.len())), 1);
@@ -124,18 +127,24 @@ impl RayTable {
 }
 
 /// Pixels taken at a time, so that the compiler can vectorise.
-const LANES: usize = 8;
+const LANES: usize = 16;
 /// Flags taken at a time.
 const FLAGS: usize = 32;
 
+/// A coordinate in either precision.
+trait Coordinate: Copy + From<f32> + MulAssign {}
+
+impl Coordinate for f32 {}
+impl Coordinate for f64 {}
+
 #[inline(always)]
-fn scale_rays(rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
+fn scale_rays<T: Coordinate>(rays: &[[T; 3]], ranges: &[f32], points: &mut [[T; 3]]) {
     let whole = ranges.len() / LANES * LANES;
     for start in (0..whole).step_by(LANES) {
-        scale::<LANES>(start, rays, ranges, points);
+        scale::<T, LANES>(start, rays, ranges, points);
     }
     for start in whole..ranges.len() {
-        scale::<1>(start, rays, ranges, points);
+        scale::<T, 1>(start, rays, ranges, points);
     }
 }
 
@@ -143,7 +152,7 @@ fn scale_rays(rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
 /// look are put side by side by the compiler, which gathers and scatters each coordinate then. Points are written when all are found:
 /// rays that they might lie over would be taken one coordinate at a time.
 #[inline(always)]
-fn scale<const L: usize>(start: usize, rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
+fn scale<T: Coordinate, const L: usize>(start: usize, rays: &[[T; 3]], ranges: &[f32], points: &mut [[T; 3]]) {
     let (Some(rays), Some(ranges)) = (rays[start..].first_chunk::<L>(), ranges[start..].first_chunk::<L>()) else {
         return;
     };
@@ -152,10 +161,10 @@ fn scale<const L: usize>(start: usize, rays: &[[f64; 3]], ranges: &[f32], points
     for lane in 0..L {
         distances[lane] = if is_distance(ranges[lane]) { ranges[lane] } else { f32::NAN };
     }
-    let known = distances.map(|distance| [f64::from(distance); 3]);
+    let known = distances.map(|distance| [T::from(distance); 3]);
     let mut found = *rays;
     for (found, range) in found.as_flattened_mut().iter_mut().zip(known.as_flattened()) {
-        *found *= range;
+        *found *= *range;
     }
     *points = found;
 }

@@ -14,6 +14,8 @@ pub(crate) const CHUNK: usize = 8192;
 pub struct RayTable {
     format: ImageFormat,
     directions: Vec<[f64; 3]>,
+    /// The same in single precision, for frames that are worked through one after the other: half of the memory is moved.
+    single: Vec<[f32; 3]>,
 }
 
 impl RayTable {
@@ -32,7 +34,8 @@ impl RayTable {
                 *ray = camera.ray([(pixel % format.width) as f64, (pixel / format.width) as f64]).into();
             }
         });
-        Ok(Self { format, directions })
+        let single = directions.iter().map(|ray| ray.map(|coordinate| coordinate as f32)).collect();
+        Ok(Self { format, directions, single })
     }
 
     /// The image format that the table belongs to.
@@ -43,6 +46,11 @@ impl RayTable {
     /// All unit directions (camera frame), row by row.
     pub fn directions(&self) -> &[[f64; 3]] {
         &self.directions
+    }
+
+    /// The unit directions in single precision.
+    pub(crate) fn single(&self) -> &[[f32; 3]] {
+        &self.single
     }
 
     /// The unit direction of one pixel in the camera frame; NaN outside the image.

@@ -10,8 +10,9 @@ pub struct ProcessedFrame {
     pub number: u64,
     /// Corrected ranges from the perspective centre, metre; NaN where there is no value.
     pub range: Raster<f32>,
-    /// Points in the camera's frame (x right, y up, looking along -z), metre, pixel by pixel; NaN where there is none.
-    pub points: Vec<[f64; 3]>,
+    /// Points in the camera's frame (x right, y up, looking along -z), metre, pixel by pixel; NaN where there is none. Single precision:
+    /// a micrometre at 8 m.
+    pub points: Vec<[f32; 3]>,
     /// Standard deviations of the ranges by noise, metre; NaN where they are not known.
     pub sigma: Raster<f32>,
     /// Reasons to distrust a pixel.
@@ -36,7 +37,7 @@ impl ProcessedFrame {
             sigma: plane.clone(),
             amplitude: plane,
             flags: Raster::filled(width, height, Flags::NO_DATA),
-            points: vec![[f64::NAN; 3]; width * height],
+            points: vec![[f32::NAN; 3]; width * height],
             ..Self::default()
         }
     }

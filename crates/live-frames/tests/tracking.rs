@@ -23,7 +23,7 @@ fn poses_are_those_of_a_tracker_of_unflagged_points() {
         let time_s = number as f64 * INTERVAL_S;
         let found = processor.process(frame.raw.samples(), time_s).unwrap();
         let kept = found.points.iter().zip(found.flags.as_slice());
-        let kept: Vec<_> = kept.map(|(point, flags)| if flags.is_empty() { *point } else { [f64::NAN; 3] }).collect();
+        let kept: Vec<_> = kept.map(|(point, flags)| if flags.is_empty() { *point } else { [f32::NAN; 3] }).collect();
         let expected = tracker.track(time_s, &kept, Some(found.sigma.as_slice()), None).unwrap();
         let pose = found.pose.unwrap();
         assert_eq!(pose, expected, "frame {number}");

@@ -93,9 +93,15 @@ fn means(plane: &Raster<f32>, factor: usize, [sums, counts]: &mut [Vec<f32>; 2],
             || add_rows(rows, sums),
         );
         if complete {
-            for (out, sums) in out.iter_mut().zip(sums.chunks(factor)) {
-                *out = sums.iter().sum::<f32>() / (pixels * sums.len()) as f32;
-            }
+            with_wide_registers(
+                #[inline(always)]
+                || match factor {
+                    2 => divide::<2>(sums, factor, pixels, out),
+                    3 => divide::<3>(sums, factor, pixels, out),
+                    4 => divide::<4>(sums, factor, pixels, out),
+                    _ => divide::<1>(sums, factor, pixels, out),
+                },
+            );
             continue;
         }
         with_wide_registers(
@@ -107,6 +113,20 @@ fn means(plane: &Raster<f32>, factor: usize, [sums, counts]: &mut [Vec<f32>; 2],
             let enough = 2.0 * count > (pixels * sums.len()) as f32;
             *out = if enough { sum / count } else { f32::NAN };
         }
+    }
+}
+
+/// Means from the sums of columns that stand for `pixels` rows, as many of them as there are in a mean of the result.
+#[inline(always)]
+fn divide<const FACTOR: usize>(sums: &[f32], factor: usize, pixels: usize, out: &mut [f32]) {
+    let (whole, _) = sums.as_chunks::<FACTOR>();
+    let count = (pixels * FACTOR) as f32;
+    let done = if FACTOR == factor { whole.len().min(out.len()) } else { 0 };
+    for (out, sums) in out[..done].iter_mut().zip(&whole[..done]) {
+        *out = sums.iter().sum::<f32>() / count;
+    }
+    for (out, sums) in out[done..].iter_mut().zip(sums[done * factor..].chunks(factor)) {
+        *out = sums.iter().sum::<f32>() / (pixels * sums.len()) as f32;
     }
 }
 

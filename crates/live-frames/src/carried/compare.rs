@@ -28,6 +28,8 @@ pub(crate) struct Compared<'a> {
     pub doubts: &'a mut [u8],
     /// Phases and confidences of the small image, a value for each pixel of a row.
     pub spread: &'a mut [Vec<f32>; 2],
+    /// Columns where blocks of a row begin in which pixels contradict or have no count.
+    pub settled: &'a mut Vec<usize>,
     pub maximum_wraps: i32,
     pub minimum_confidence: f32,
 }
@@ -44,7 +46,7 @@ impl Compared<'_> {
     /// when they did often enough; those without a count take its.
     pub fn check(&mut self, coarse: &Coarse) -> Outcome {
         let (width, height) = (self.phase.width(), self.phase.height());
-        let mut outcome = Outcome::default();
+        let (mut outcome, mut settled) = (Outcome::default(), std::mem::take(self.settled));
         for row in 0..height {
             if row % coarse.factor == 0 {
                 self.spread_row(coarse, row / coarse.factor, width);
@@ -61,22 +63,23 @@ impl Compared<'_> {
                 doubts: &mut self.doubts[at.clone()],
             };
             let least = self.minimum_confidence;
-            let any = with_wide_registers(
+            settled.clear();
+            with_wide_registers(
                 #[inline(always)]
-                || compared.check(least),
+                || compared.check(least, &mut settled),
             );
-            if any {
-                self.settle_row(at, &mut outcome);
+            for start in settled.drain(..) {
+                self.settle(at.start, start..(start + LANES).min(width), &mut outcome);
             }
         }
+        *self.settled = settled;
         outcome
     }
 
-    /// Pixels of a row that contradict or have no count.
-    fn settle_row(&mut self, at: std::ops::Range<usize>, outcome: &mut Outcome) {
-        let first = at.start;
-        for pixel in at {
-            let column = pixel - first;
+    /// Pixels that contradict or have no count, among some of the row whose first pixel is given.
+    fn settle(&mut self, first: usize, columns: std::ops::Range<usize>, outcome: &mut Outcome) {
+        for column in columns {
+            let pixel = first + column;
             let open = self.state[pixel] == OPEN;
             if !open && self.doubts[pixel] == 0 {
                 continue;
@@ -129,18 +132,22 @@ struct Row<'a> {
 const LANES: usize = 32;
 
 impl Row<'_> {
-    /// Compares all pixels; whether any contradicts or has no count.
+    /// Compares all pixels, and lists where blocks begin in which any contradicts or has no count.
     #[inline(always)]
-    fn check(&mut self, least: f32) -> bool {
-        let mut any = 0;
+    fn check(&mut self, least: f32, settled: &mut Vec<usize>) {
         let whole = self.phase.len() / LANES * LANES;
         for start in (0..whole).step_by(LANES) {
-            any |= self.pixels::<LANES>(start, least).unwrap_or(0);
+            if self.pixels::<LANES>(start, least).unwrap_or(0) != 0 {
+                settled.push(start);
+            }
         }
+        let mut any = 0;
         for start in whole..self.phase.len() {
             any |= self.pixels::<1>(start, least).unwrap_or(0);
         }
-        any != 0
+        if any != 0 {
+            settled.push(whole);
+        }
     }
 
     /// `L` pixels from `start` on; `None` beyond the row.

@@ -4,6 +4,8 @@
 
 use std::f32::consts::TAU;
 
+use crate::carried::attach::Block;
+
 /// No phase.
 pub(crate) const MASKED: u8 = 0;
 /// The check failed: the count is not known yet.
@@ -57,17 +59,24 @@ pub(crate) struct Row<'a> {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Tally {
     pub used: u32,
-    pub open: u32,
+    pub failed: u32,
 }
 
 /// Pixels taken at a time, so that the compiler can vectorise; few, since one that fails takes the others the long way.
-const LANES: usize = 16;
+pub(crate) const LANES: usize = 16;
 
 /// Predicts each pixel's count as the one that brings its phase nearest to what was known last, and checks it: the phase may
-/// not step far, and amplitude times range squared not change.
+/// not step far, and amplitude times range squared not change. Lists the blocks in which pixels fail; `first` is the row's first
+/// pixel.
 #[inline(always)]
-pub(crate) fn carry_row(row: &mut Row<'_>, limits: Limits) -> Tally {
-    let mut tally = Tally::default();
+pub(crate) fn carry_row(row: &mut Row<'_>, first: u32, limits: Limits, blocks: &mut Vec<Block>) -> Tally {
+    let (mut tally, mut used) = (Tally::default(), 0);
+    let mut list = |col: usize, open: u32| {
+        if open != 0 {
+            tally.failed += open.count_ones();
+            blocks.push(Block { first: first + col as u32, col: col as u32, open, attached: 0 });
+        }
+    };
     let (phase, last_phase) = row.phase.as_chunks::<LANES>();
     let (amplitude, last_amplitude) = row.amplitude.as_chunks::<LANES>();
     let (unwrapped, last_unwrapped) = row.unwrapped.as_chunks_mut::<LANES>();
@@ -76,12 +85,16 @@ pub(crate) fn carry_row(row: &mut Row<'_>, limits: Limits) -> Tally {
     let (state, last_state) = row.state.as_chunks_mut::<LANES>();
     let given = phase.iter().zip(amplitude);
     let kept = unwrapped.iter_mut().zip(before).zip(wraps.iter_mut().zip(state));
-    for ((phase, amplitude), ((unwrapped, before), (wraps, state))) in given.zip(kept) {
-        carry_pixels(phase, amplitude, unwrapped, before, wraps, state, limits, &mut tally);
+    let whole = row.phase.len() - last_phase.len();
+    for (col, ((phase, amplitude), ((unwrapped, before), (wraps, state)))) in
+        (0..whole).step_by(LANES).zip(given.zip(kept))
+    {
+        list(col, carry_pixels(phase, amplitude, unwrapped, before, wraps, state, limits, &mut used));
     }
+    let mut last_open = 0;
     for i in 0..last_phase.len() {
         let one = std::array::from_ref::<f32>;
-        carry_pixels::<1>(
+        let open = carry_pixels::<1>(
             one(&last_phase[i]),
             one(&last_amplitude[i]),
             std::array::from_mut(&mut last_unwrapped[i]),
@@ -89,12 +102,16 @@ pub(crate) fn carry_row(row: &mut Row<'_>, limits: Limits) -> Tally {
             std::array::from_mut(&mut last_wraps[i]),
             std::array::from_mut(&mut last_state[i]),
             limits,
-            &mut tally,
+            &mut used,
         );
+        last_open |= open << i;
     }
+    list(whole, last_open);
+    tally.used = used;
     tally
 }
 
+/// Carries `L` pixels, counts those that are used, and gives those that fail, a bit each.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)] // planes of one row, in the order of `Row`
 fn carry_pixels<const L: usize>(
@@ -105,13 +122,13 @@ fn carry_pixels<const L: usize>(
     wraps: &mut [i32; L],
     state: &mut [u8; L],
     limits: Limits,
-    tally: &mut Tally,
-) {
+    all_used: &mut u32,
+) -> u32 {
     if hold_steady(phase, amplitude, unwrapped, before, wraps, limits) {
         *before = *amplitude;
         *state = [HELD; L];
-        tally.used = tally.used.wrapping_add(L as u32);
-        return;
+        *all_used = all_used.wrapping_add(L as u32);
+        return 0;
     }
     let [mut told, mut used, mut open] = [[0_u32; L]; 3];
     let mut counts = [0.0_f32; L];
@@ -151,8 +168,8 @@ fn carry_pixels<const L: usize>(
         wraps[i] = ((counts[i] + ROUND).to_bits() & 0xff) as i32;
         state[i] = told[i] as u8;
     }
-    tally.used = tally.used.wrapping_add(used.iter().fold(0, |sum: u32, one| sum.wrapping_add(*one)));
-    tally.open = tally.open.wrapping_add(open.iter().fold(0, |sum: u32, one| sum.wrapping_add(*one)));
+    *all_used = all_used.wrapping_add(used.iter().fold(0, |sum: u32, one| sum.wrapping_add(*one)));
+    open.iter().enumerate().fold(0, |bits, (i, open)| bits | open << i)
 }
 
 /// Takes over counts and unwrapped phases of this frame where all pixels hold by the limits that apply whatever the noise is, as
@@ -194,10 +211,6 @@ fn hold_steady<const L: usize>(
 /// no quotient; amplitudes from 1e-9 to 1e9 keep within single precision.
 #[inline(always)]
 pub(crate) fn is_gentle(step: f32, [a, b]: [f32; 2], noise2: f32) -> bool {
-    // Whatever the noise is, or where it is not known.
-    if (step <= SLOPE_RAD) & (a <= STEADY_RATIO * b) & (b <= STEADY_RATIO * a) {
-        return true;
-    }
     // Neighbours lie on a slope, which the step in time does not see.
     let near = (step <= SLOPE_RAD) | (scaled(step, [a, b]) <= noise_of_step([a, b], noise2));
     // Not beyond the steady ratio by more than noise makes of it.

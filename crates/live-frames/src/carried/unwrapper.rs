@@ -2,11 +2,11 @@ use std::f32::consts::TAU;
 
 use range_image::{ComplexChannel, Raster, with_wide_registers};
 
-use crate::carried::attach::Attaching;
+use crate::carried::attach::{Attaching, Block};
 use crate::carried::coarse::Coarse;
 use crate::carried::compare::Compared;
 use crate::carried::options::{CarryOptions, CarrySummary, WholeFrame};
-use crate::carried::pixels::{HELD, Limits, MASKED, OPEN, Row, carry_row};
+use crate::carried::pixels::{HELD, LANES, Limits, MASKED, OPEN, Row, carry_row};
 use phase_unwrap::{Error, KnownWraps, SpatialOptions, Unwrapped, Unwrapper};
 
 /// Share of the pixels that may be left without a count, or in contradiction, until the next check; beyond it the frame is
@@ -37,9 +37,11 @@ pub struct CarriedUnwrapper {
     before: Vec<f32>,
     state: Vec<u8>,
     doubts: Vec<u8>,
+    /// Blocks of pixels some of which failed, in the order of the image.
+    blocks: Vec<Block>,
     open: Vec<u32>,
-    attached: Vec<u32>,
     spread: [Vec<f32>; 2],
+    settled: Vec<usize>,
     noise2: f32,
     /// Pixels that contradicted the small image when it was made last.
     doubted: usize,
@@ -132,10 +134,12 @@ impl CarriedUnwrapper {
         self.doubts.clear();
         self.doubts.resize(width * height, 0);
         self.spread = [vec![f32::NAN; width], vec![f32::NAN; width]];
-        for list in [&mut self.open, &mut self.attached] {
-            list.clear();
-            list.reserve(width * height);
-        }
+        self.blocks.clear();
+        self.blocks.reserve(width.div_ceil(LANES) * height);
+        self.open.clear();
+        self.open.reserve(width * height);
+        self.settled.clear();
+        self.settled.reserve(width);
         self.coarse.resize(width, height);
     }
 
@@ -161,22 +165,30 @@ impl CarriedUnwrapper {
 
     /// Predicts and checks the counts of all pixels. What fails is attached to its neighbours a row later, while it is near.
     fn carry(&mut self, phase: &Raster<f32>, amplitude: &Raster<f32>, summary: &mut CarrySummary) {
-        let (mut open, mut attached) = (std::mem::take(&mut self.open), std::mem::take(&mut self.attached));
-        open.clear();
-        attached.clear();
+        let mut blocks = std::mem::take(&mut self.blocks);
+        blocks.clear();
+        let mut swept = 0;
         for row in 0..phase.height() {
-            self.carry_row(row, phase, amplitude, summary);
-            if row > 0 {
-                self.attaching(phase, amplitude).sweep_row(row - 1, &mut open, &mut attached);
-            }
+            let above = blocks.len();
+            self.carry_row(row, phase, amplitude, &mut blocks, summary);
+            self.attaching(phase, amplitude).sweep(&mut blocks[swept..above]);
+            swept = above;
         }
-        self.attaching(phase, amplitude).sweep_row(phase.height() - 1, &mut open, &mut attached);
-        (self.open, self.attached) = (open, attached);
+        self.attaching(phase, amplitude).sweep(&mut blocks[swept..]);
+        self.blocks = blocks;
     }
 
-    fn carry_row(&mut self, row: usize, phase: &Raster<f32>, amplitude: &Raster<f32>, summary: &mut CarrySummary) {
+    fn carry_row(
+        &mut self,
+        row: usize,
+        phase: &Raster<f32>,
+        amplitude: &Raster<f32>,
+        blocks: &mut Vec<Block>,
+        summary: &mut CarrySummary,
+    ) {
         let limits = Limits { noise2: self.noise2, maximum_wraps: f32::from(self.options.maximum_wraps) };
         let at = row * phase.width()..(row + 1) * phase.width();
+        let first = at.start as u32;
         let mut row = Row {
             phase: &phase.as_slice()[at.clone()],
             amplitude: &amplitude.as_slice()[at.clone()],
@@ -187,10 +199,10 @@ impl CarriedUnwrapper {
         };
         let tally = with_wide_registers(
             #[inline(always)]
-            || carry_row(&mut row, limits),
+            || carry_row(&mut row, first, limits, blocks),
         );
         summary.used += tally.used as usize;
-        summary.failed += tally.open as usize;
+        summary.failed += tally.failed as usize;
     }
 
     /// Finds the counts of the pixels that failed, and checks all of them when it is time to.
@@ -201,9 +213,9 @@ impl CarriedUnwrapper {
         frame: u32,
         summary: &mut CarrySummary,
     ) -> Result<(), Error> {
-        let (mut open, mut attached) = (std::mem::take(&mut self.open), std::mem::take(&mut self.attached));
-        let at_edges = self.attaching(phase, amplitude).grow(&mut open, &mut attached);
-        summary.attached = attached.len();
+        let (mut blocks, mut open) = (std::mem::take(&mut self.blocks), std::mem::take(&mut self.open));
+        let [attached, at_edges] = self.attaching(phase, amplitude).grow(&mut blocks, &mut open);
+        summary.attached = attached;
         let least = LEFT_SHARE * summary.used as f32;
         let urgent = open.len() as f32 > least || self.doubted as f32 > least;
         if urgent || frame.is_multiple_of(self.carry.check_frames) {
@@ -215,7 +227,7 @@ impl CarriedUnwrapper {
         }
         summary.guessed = open.len() + at_edges;
         self.attaching(phase, amplitude).guess(&open);
-        (self.open, self.attached) = (open, attached);
+        (self.blocks, self.open) = (blocks, open);
         Ok(())
     }
 
@@ -230,6 +242,7 @@ impl CarriedUnwrapper {
             confidence: self.out.confidence.as_mut_slice(),
             doubts: &mut self.doubts,
             spread: &mut self.spread,
+            settled: &mut self.settled,
             maximum_wraps: i32::from(self.options.maximum_wraps),
             minimum_confidence: self.options.minimum_confidence,
         };
@@ -240,8 +253,9 @@ impl CarriedUnwrapper {
 
     fn attaching<'a>(&'a mut self, phase: &'a Raster<f32>, amplitude: &'a Raster<f32>) -> Attaching<'a> {
         Attaching {
-            phase,
-            amplitude,
+            width: phase.width(),
+            phase: phase.as_slice(),
+            amplitude: amplitude.as_slice(),
             state: &mut self.state,
             unwrapped: &mut self.unwrapped,
             before: &mut self.before,

@@ -19,7 +19,7 @@ pub(crate) struct Pose {
     tracker: Tracker,
     options: TrackerOptions,
     /// Where deviations are not known.
-    points: Vec<[f64; 3]>,
+    points: Vec<[f32; 3]>,
     sigma: Vec<f32>,
     last: Option<TrackedPose>,
     /// The tracker's time of the last frame, and what it is ahead of the frames' clock by.
@@ -98,7 +98,7 @@ impl Pose {
         } else {
             let kept = frame.points.iter().zip(frame.flags.as_slice());
             self.points.clear();
-            self.points.extend(kept.map(|(point, flags)| if flags.is_empty() { *point } else { [f64::NAN; 3] }));
+            self.points.extend(kept.map(|(point, flags)| if flags.is_empty() { *point } else { [f32::NAN; 3] }));
             self.tracker.track(time_s, &self.points, None, None)?
         };
         self.tracker.forget_poses();

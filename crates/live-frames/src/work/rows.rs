@@ -16,7 +16,7 @@ pub(crate) struct Chunk<'a> {
     pub(crate) sigma: &'a mut [f32],
     pub(crate) amplitude: &'a mut [f32],
     pub(crate) flags: &'a mut [Flags],
-    pub(crate) points: &'a mut [[f64; 3]],
+    pub(crate) points: &'a mut [[f32; 3]],
 }
 
 /// A frame in chunks of so many rows, with something of its own for each, which `work` is done on.

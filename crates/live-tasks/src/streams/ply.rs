@@ -42,7 +42,8 @@ impl<W: Write> PlyStream<W> {
                 continue;
             }
             count += 1;
-            let place = pose.map_or(Point3::from(*point), |pose| pose * Point3::from(*point));
+            let point = Point3::from(point.map(f64::from));
+            let place = pose.map_or(point, |pose| pose * point);
             let [x, y, z] = [0, 1, 2].map(|axis| place[axis] as f32);
             let values = [x, y, z, planes[0][index], planes[1][index]];
             let mut record = [0; RECORD];

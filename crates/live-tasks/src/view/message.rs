@@ -27,7 +27,7 @@ pub(super) fn write(frame: &ProcessedFrame, bytes: &mut Vec<u8>) {
         pixels().for_each(|index| bytes.extend(plane[index].to_le_bytes()));
     }
     for index in pixels() {
-        frame.points[index].iter().for_each(|value| bytes.extend((*value as f32).to_le_bytes()));
+        frame.points[index].iter().for_each(|value| bytes.extend(value.to_le_bytes()));
     }
     let flags = frame.flags.as_slice();
     pixels().for_each(|index| bytes.extend(flags[index].bits().to_le_bytes()));

@@ -62,7 +62,11 @@ impl OrganisedFrame {
     /// # Errors
     /// [`InputError::LengthMismatch`](rigid_pose::InputError::LengthMismatch) where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
     /// not lie on the rays of their pixels.
-    pub fn new(projection: &Arc<Projection>, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<Self> {
+    pub fn new<T: Copy + Into<f64> + Sync>(
+        projection: &Arc<Projection>,
+        points: &[[T; 3]],
+        sigma: Option<&[f32]>,
+    ) -> Result<Self> {
         let grid = Arc::clone(&projection.grids[0]);
         let nodes = grid.len();
         let mut frame = Self {
@@ -90,7 +94,7 @@ impl OrganisedFrame {
     ///
     /// # Errors
     /// As [`OrganisedFrame::new`]; the frame then stays as it was.
-    pub fn update(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<()> {
+    pub fn update<T: Copy + Into<f64> + Sync>(&mut self, points: &[[T; 3]], sigma: Option<&[f32]>) -> Result<()> {
         let (width, height) = (self.projection.width(), self.projection.height());
         let expected = width * height;
         require_length("points of the frame", expected, points.len())?;
@@ -214,7 +218,7 @@ impl OrganisedFrame {
         self.is_whole = false;
     }
 
-    fn reduce(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) {
+    fn reduce<T: Copy + Into<f64> + Sync>(&mut self, points: &[[T; 3]], sigma: Option<&[f32]>) {
         let (grid, width) = (&self.grid, self.projection.width());
         let values = self.inverse_depth.par_chunks_mut(grid.cols).zip(self.spread.par_chunks_mut(grid.cols));
         let pixels = self.share.par_chunks_mut(grid.cols).zip(self.place.par_chunks_mut(grid.cols));
@@ -294,11 +298,11 @@ impl OrganisedFrame {
 }
 
 /// Refuses frames most of whose points lie beside the rays of their pixels, by a sample of them.
-fn check_rays(projection: &Projection, points: &[[f64; 3]]) -> Result<()> {
+fn check_rays<T: Copy + Into<f64>>(projection: &Projection, points: &[[T; 3]]) -> Result<()> {
     let (mut off, mut tried, mut example) = (0, 0, 0);
     let step = points.len() / 101 + 1;
     for index in (0..points.len()).step_by(step) {
-        let p = points[index];
+        let p = points[index].map(Into::into);
         if !(p[2].abs() > LEAST_DEPTH_M && p[2].abs() < LARGEST_DEPTH_M && p[0].is_finite() && p[1].is_finite()) {
             continue;
         }

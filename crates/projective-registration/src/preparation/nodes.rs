@@ -18,12 +18,12 @@ pub(crate) const LEAST_DEPTH_M: f64 = 1e-5;
 pub(crate) const LARGEST_DEPTH_M: f64 = 1e7;
 
 /// One row of nodes from the pixels below it.
-pub(crate) struct NodeRow<'a> {
+pub(crate) struct NodeRow<'a, T> {
     pub grid: &'a Grid,
     pub row: usize,
     /// Pixels in a row.
     pub width: usize,
-    pub points: &'a [[f64; 3]],
+    pub points: &'a [[T; 3]],
     pub sigma: Option<&'a [f32]>,
     /// Inverse depth of the nodes, per metre; NaN where no pixel has any.
     pub inverse_depth: &'a mut [f32],
@@ -37,7 +37,7 @@ pub(crate) struct NodeRow<'a> {
     pub is_whole: bool,
 }
 
-impl pulp::WithSimd for NodeRow<'_> {
+impl<T: Copy + Into<f64>> pulp::WithSimd for NodeRow<'_, T> {
     /// Whether all pixels are valid.
     type Output = bool;
 
@@ -53,7 +53,7 @@ impl pulp::WithSimd for NodeRow<'_> {
     }
 }
 
-impl NodeRow<'_> {
+impl<T: Copy + Into<f64>> NodeRow<'_, T> {
     /// `BIN`: pixels a side of a node, 0 where only known when running.
     #[inline(always)]
     fn run<const BIN: usize>(mut self) -> bool {
@@ -133,7 +133,8 @@ impl NodeRow<'_> {
             let below = line as f32 - (bin as f32 - 1.0) / 2.0;
             for k in 0..pixels {
                 // What single precision cannot hold is infinite, and fails, as NaN does.
-                let (depth, s) = (-points[k][2] as f32, sigma[k]);
+                let (z, s): (f64, f32) = (points[k][2].into(), sigma[k]);
+                let depth = -z as f32;
                 let is_known = (depth > LEAST_DEPTH_M as f32) & (depth < LARGEST_DEPTH_M as f32);
                 let is_valid = is_known & (s > 0.0) & (s < f32::INFINITY);
                 let one = if is_valid { 1.0 } else { 0.0 };

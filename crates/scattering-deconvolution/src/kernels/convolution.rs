@@ -134,7 +134,19 @@ fn gather(
     used: usize,
 ) {
     let count = lines.len() / length;
-    for (index, source) in matrix.chunks_exact(stride).take(used).enumerate() {
+    // Squares are turned as a whole: single numbers would each go to another line.
+    let squares = if count == LINES { used / LINES * LINES } else { 0 };
+    for index in (0..squares).step_by(LINES) {
+        let mut square = [[Complex::new(0.0, 0.0); LINES]; LINES];
+        for (row, to) in square.iter_mut().enumerate() {
+            to.copy_from_slice(&matrix[(index + row) * stride + first..][..LINES]);
+        }
+        for line in 0..LINES {
+            let turned = square.map(|row| row[line]);
+            lines[line * length + index..][..LINES].copy_from_slice(&turned);
+        }
+    }
+    for (index, source) in matrix.chunks_exact(stride).enumerate().take(used).skip(squares) {
         for (line, value) in source[first..first + count].iter().enumerate() {
             lines[line * length + index] = *value;
         }

@@ -148,26 +148,18 @@ pub(crate) fn largest_part(values: &[f32]) -> f32 {
     f32::from_bits(values.iter().map(magnitude).max().unwrap_or(0) as u32)
 }
 
-/// Smallest and largest of the finite values, none of which is negative; infinity and zero where there is none.
+/// Smallest and largest of the finite values, none of which is negative; infinity and zero where there is none. Patterns of bits
+/// are compared, as in [`largest_part`].
 #[inline(always)]
 pub(crate) fn finite_extremes(values: &[f32]) -> [f32; 2] {
-    let mut extremes = [[f32::INFINITY; LANES], [0.0; LANES]];
-    let [least, most] = &mut extremes;
-    let mut take = |lane: usize, value: f32| {
-        least[lane] = if value < least[lane] { value } else { least[lane] };
-        let finite = if value < f32::INFINITY { value } else { 0.0 };
-        most[lane] = if finite > most[lane] { finite } else { most[lane] };
-    };
-    let (chunks, rest) = values.as_chunks::<LANES>();
-    for chunk in chunks {
-        for (lane, &value) in chunk.iter().enumerate() {
-            take(lane, value);
-        }
+    const INFINITE: i32 = f32::INFINITY.to_bits() as i32;
+    let (mut least, mut most) = (INFINITE, 0);
+    for value in values {
+        let magnitude = (value.to_bits() & 0x7fff_ffff) as i32;
+        least = least.min(magnitude);
+        most = most.max(if magnitude < INFINITE { magnitude } else { 0 });
     }
-    for &value in rest {
-        take(0, value);
-    }
-    [extremes[0].into_iter().fold(f32::INFINITY, f32::min), extremes[1].into_iter().fold(0.0, f32::max)]
+    [least, most].map(|bits| f32::from_bits(bits as u32))
 }
 
 /// Whether a pixel of the row has got more light than it has left: `light² > limit · (re² + im²)`.

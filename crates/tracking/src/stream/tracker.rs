@@ -88,10 +88,10 @@ impl Tracker {
     /// [`Error::NotAscending`] where the time is not later than that of the frame before, [`InputError::Numerical`] for a
     /// prior that is not finite or whose covariance is not positive definite, [`Error::Frames`] for
     /// frames of another camera. Nothing has changed then.
-    pub fn track(
+    pub fn track<T: Copy + Into<f64> + Sync>(
         &mut self,
         timestamp_s: f64,
-        points: &[[f64; 3]],
+        points: &[[T; 3]],
         sigma: Option<&[f32]>,
         prior: Option<&MotionPrior>,
     ) -> Result<TrackedPose> {

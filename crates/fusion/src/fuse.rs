@@ -5,7 +5,9 @@ use point_uncertainty::{CommonErrors, PointErrors, Shares, Source};
 use rayon::prelude::*;
 use statistics::upper_median;
 
-use crate::common::{self, Conditioned, Row, Squares, condition, form, split, variance_factors, without_shared};
+use crate::common::{
+    self, Conditioned, Row, Squares, condition, form, noise_factor, split, variance_factors, without_shared,
+};
 use crate::input::{Observation, Observations, Registered};
 use crate::options::{CommonErrorUse, FusionOptions};
 use crate::outcome::{Fused, Surfel};
@@ -101,16 +103,14 @@ fn thinned(observations: &Observations, points: usize) -> Option<Observations> {
 impl Task<'_> {
     /// The fused cloud of points that the common errors which were found have been taken off; `common` are those that remain.
     fn finish(&self, common: &CommonErrors, observations: &Observations, found: Conditioned) -> Result<Fused> {
-        let Self { input, errors, options } = *self;
-        let (gate, layers) = (options.gate(), &found.layers);
-        let patches = patches(observations, errors, common)?;
-        let seeds = seeds(&patches, &observations.lattice, layers, gate);
-        let mut gathered = gather(observations, &patches, &seeds, layers, gate);
-        nonempty(&gathered, observations)?;
-        split(&mut gathered, observations, errors, common, options.level)?;
-        let mut bends = bends(&gathered.seeds, &gathered.estimates, options.voxel_m);
-        let is_even = is_even(&gathered, &bends, options);
-        give_up(&mut gathered, &mut bends, &is_even, Owner::Uneven);
+        let Self { input, options, .. } = *self;
+        let (mut gathered, mut bends) = self.places(common, observations, &found.layers)?;
+        let noise_factor = noise_factor(&self.rows(&gathered, observations, common)?.1);
+        let noisier = (noise_factor > 1.0).then(|| observations.noisier(noise_factor));
+        let observations = noisier.as_ref().unwrap_or(observations);
+        if noisier.is_some() {
+            (gathered, bends) = self.places(common, observations, &found.layers)?;
+        }
         let (mut contradictions, mut outvoted) = (Vec::new(), 0);
         loop {
             nonempty(&gathered, observations)?;
@@ -130,7 +130,7 @@ impl Task<'_> {
             let mut fronts: Vec<u32> = pairs.iter().map(|pair| pair.front).collect();
             fronts.sort_unstable();
             fronts.dedup();
-            let unfused = sight::reasons(&scene, observations, &gathered.owners, gate);
+            let unfused = sight::reasons(&scene, observations, &gathered.owners, options.gate());
             return Ok(Fused {
                 surfel_of_point: surfels_of_points(&gathered, observations),
                 strongest: gathered.estimates.iter().map(|place| place.strongest).collect(),
@@ -139,6 +139,7 @@ impl Task<'_> {
                 contradictions,
                 outvoted,
                 seen_through: fronts.len(),
+                noise_factor,
                 apart: found.apart,
                 shared_error: found.shared,
                 corrections: found.posterior.values.iter().copied().collect(),
@@ -146,6 +147,41 @@ impl Task<'_> {
                 rows,
             });
         }
+    }
+
+    /// Places whose points lie on planes, and what surfaces do around them.
+    fn places(
+        &self,
+        common: &CommonErrors,
+        observations: &Observations,
+        layers: &[u32],
+    ) -> Result<(Gathered, Vec<Bend>)> {
+        let Self { errors, options, .. } = *self;
+        let gate = options.gate();
+        let patches = patches(observations, errors, common)?;
+        let seeds = seeds(&patches, &observations.lattice, layers, gate);
+        let mut gathered = gather(observations, &patches, &seeds, layers, gate);
+        nonempty(&gathered, observations)?;
+        split(&mut gathered, observations, errors, common, options.level)?;
+        let mut bends = bends(&gathered.seeds, &gathered.estimates, options.voxel_m);
+        let is_even = is_even(&gathered, &bends, options);
+        give_up(&mut gathered, &mut bends, &is_even, Owner::Uneven);
+        Ok((gathered, bends))
+    }
+
+    /// Derivatives of the heights of places by common errors, and by how much their frames differ.
+    fn rows(
+        &self,
+        gathered: &Gathered,
+        observations: &Observations,
+        common: &CommonErrors,
+    ) -> Result<(Vec<Row>, Vec<Squares>)> {
+        let of_place = |place: &Estimate| {
+            let rows = common::rows(place, &place.normal, &observations.all, self.errors, common)?;
+            Ok((common::mean(place, &rows), Squares::new(place, &rows, common)))
+        };
+        let all: Vec<_> = gathered.estimates.par_iter().with_min_len(64).map(of_place).collect::<Result<_>>()?;
+        Ok(all.into_iter().unzip())
     }
 
     /// The surfels of places, with the derivatives of their heights by common errors.
@@ -156,17 +192,7 @@ impl Task<'_> {
         observations: &Observations,
         common: &CommonErrors,
     ) -> Result<(Vec<Row>, Vec<Surfel>)> {
-        let (rows, squares): (Vec<Row>, Vec<Squares>) = gathered
-            .estimates
-            .par_iter()
-            .with_min_len(64)
-            .map(|place| {
-                let rows = common::rows(place, &place.normal, &observations.all, self.errors, common)?;
-                Ok((common::mean(place, &rows), Squares::new(place, &rows, common)))
-            })
-            .collect::<Result<Vec<_>>>()?
-            .into_iter()
-            .unzip();
+        let (rows, squares) = self.rows(gathered, observations, common)?;
         let factors = variance_factors(gathered, &squares);
         let surfels = (0..rows.len())
             .into_par_iter()

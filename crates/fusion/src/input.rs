@@ -87,6 +87,19 @@ pub(crate) struct Observations {
     pub lattice: Lattice,
 }
 
+impl Observations {
+    /// The same with `factor` times the variances of noise and neighbourhoods.
+    pub fn noisier(&self, factor: f64) -> Self {
+        let (variance, deviation) = (factor as f32, factor.sqrt() as f32);
+        let noisier = |of: &Observation| Observation {
+            noise: of.noise.map(|v| v * variance),
+            shift: of.shift.map(|v| v * deviation),
+            ..*of
+        };
+        Self { all: self.all.par_iter().map(noisier).collect(), keys: self.keys.clone(), lattice: self.lattice }
+    }
+}
+
 impl Registered<'_> {
     /// Lengths, numbers, frames.
     pub(crate) fn check(&self) -> Result<()> {

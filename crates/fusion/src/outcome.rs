@@ -161,6 +161,9 @@ pub struct Fused {
     pub outvoted: usize,
     /// How many of `surfels` a frame has seen through.
     pub seen_through: usize,
+    /// By how many times the noise of points and of their neighbourhoods is larger than stated, in the variance, as most places
+    /// show by what their frames differ by; 1 where it is not. It is in [`Surfel::shares`].
+    pub noise_factor: f64,
     /// Stations that do not fit the others.
     pub apart: Vec<Apart>,
     /// What was found of the common errors, in their units, and has been taken off the points. Zeros where they were not estimated.

@@ -68,17 +68,16 @@ fn what_all_frames_bend_alike_is_taken_off() {
     // Drawn: 0.004, alike over twelve pixels.
     let found = fused.shared_error.unwrap();
     assert!((0.002..0.008).contains(&found.sigma_per_m) && (6.0..=48.0).contains(&found.length_px), "{found:?}");
-    // Without it, frames see parts of the walls so far apart that these stand twice.
-    let [before, after] = [plain.surfels.len() as f64, fused.surfels.len() as f64];
-    assert!(before > 1.1 * after, "{before} {after}");
+    // Without it, frames see parts of the walls so far apart that it is taken for noise.
+    assert!(plain.noise_factor > 1.5 && fused.noise_factor == 1.0, "{} {}", plain.noise_factor, fused.noise_factor);
     let by_sources = |surfel: &Surfel| (surfel.shares.variance() + surfel.shape_variance).sqrt();
     let [[sigma_before, thickness_before], [sigma_after, thickness_after]] =
         [scatter(&bent, &plain, by_sources), scatter(&bent, &fused, by_sources)];
     // The frames tell that something is missing.
     let [told_before, _] = scatter(&bent, &plain, Surfel::sigma_m);
     assert!((0.8..1.3).contains(&told_before), "{told_before}");
-    // Too small before. After, deviations have in them what whole walls err by with the poses, which is no scatter.
-    assert!(sigma_before > 1.5 && (0.4..1.0).contains(&sigma_after), "{sigma_before} {sigma_after}");
+    // After, deviations have in them what whole walls err by with the poses, which is no scatter.
+    assert!(sigma_before > 0.8 && (0.4..1.0).contains(&sigma_after), "{sigma_before} {sigma_after}");
     assert!(thickness_before > 1.1 && (0.75..1.1).contains(&thickness_after), "{thickness_before} {thickness_after}");
 }
 

@@ -69,6 +69,7 @@ pub(crate) fn finish(
     summary.thickness = thickness(usable, moved, fused);
     let nodes = options.shared_error.map_or(0..0, |grid| grid.columns());
     summary.shared_error = shared_error(fused, &nodes);
+    summary.noise_factor = fused.noise_factor;
     summary.corrections = corrections(usable.cloud, fused, &nodes);
     findings(summary, fused, !nodes.is_empty());
     doubts(summary);
@@ -209,6 +210,12 @@ fn findings(summary: &mut FuseSummary, fused: &Fused, is_depth_camera: bool) {
             "{} fused points were given up, since twice as many frames spoke against them as for them; their points are among those \
              that are in none.",
             fused.outvoted
+        ));
+    }
+    if fused.noise_factor > 1.0 {
+        summary.findings.push(format!(
+            "The noise of points is {:.1} times what is stated of it, as most surfaces show by what frames differ by: it counts as such.",
+            fused.noise_factor.sqrt()
         ));
     }
     summary.findings.extend(disagreement(fused));

@@ -41,6 +41,8 @@ pub struct FuseSummary {
     /// The error that all frames of a depth camera share; missing where it was not looked for, or does not show.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shared_error: Option<SharedErrorSummary>,
+    /// By how many times the variance of the points' noise is larger than stated, as most surfaces show; 1 where it is not.
+    pub noise_factor: f64,
     /// What was found of the other common errors.
     pub corrections: Vec<Correction>,
     /// What a reader should know, in sentences.

@@ -133,7 +133,7 @@ impl Task<'_> {
             let unfused = sight::reasons(&scene, observations, &gathered.owners, options.gate());
             return Ok(Fused {
                 surfel_of_point: surfels_of_points(&gathered, observations),
-                strongest: gathered.estimates.iter().map(|place| place.strongest).collect(),
+                strongest: gathered.estimates.iter().zip(&bends).map(strongest).collect(),
                 surfels,
                 unfused,
                 contradictions,
@@ -234,6 +234,12 @@ fn shares(place: &Estimate, left: f64, row: &Row, common: &CommonErrors) -> Shar
         shares.parts[source as usize] += form(&vec![(*column, *by)], row, common.covariance());
     }
     shares
+}
+
+/// The neighbourhood with the largest part of a place's variance, and its shift, of which tests have left as much as of the variance.
+fn strongest((place, bend): (&Estimate, &Bend)) -> (u64, f64) {
+    let (neighbourhood, shift) = place.strongest;
+    (neighbourhood, shift * bend.left.sqrt())
 }
 
 fn amplitude(input: &Registered<'_>, members: &[u32], observations: &Observations) -> f64 {

@@ -31,6 +31,8 @@ const NOISIER: f64 = 1.44;
 pub(crate) struct Squares {
     sum: f64,
     dof: f64,
+    /// Part of the degrees of freedom that belongs to common errors: the trace of `S⁻¹ R C Rᵀ`, both of the differences.
+    common: f64,
 }
 
 impl Squares {
@@ -60,7 +62,12 @@ impl Squares {
         let heights: Vec<f64> = others.iter().map(|frame| height(frame) - height(first)).collect();
         let mut weighted = heights.clone();
         dense_matrices::solve_cholesky(covariance.as_slice(), size, &mut weighted, 1);
-        Self { sum: heights.iter().zip(&weighted).map(|(height, weighted)| height * weighted).sum(), dof: size as f64 }
+        let sum = heights.iter().zip(&weighted).map(|(height, weighted)| height * weighted).sum();
+        // The trace of `S⁻¹` times what is the place's own of the covariance of the differences.
+        let inverse = dense_matrices::inverse_of_cholesky(covariance.as_slice(), size);
+        let own: f64 = inverse.iter().sum::<f64>() * variance(first)
+            + others.iter().enumerate().map(|(at, frame)| inverse[at * size + at] * variance(frame)).sum::<f64>();
+        Self { sum, dof: size as f64, common: (size as f64 - own).max(0.0) }
     }
 }
 
@@ -79,6 +86,34 @@ pub(crate) fn noise_factor(squares: &[Squares]) -> f64 {
     median.map(|(ratio, _)| *ratio).filter(|ratio| *ratio > NOISIER).unwrap_or(1.0)
 }
 
+/// Squares of places that are asked together.
+#[derive(Default)]
+struct Together {
+    squares: Squares,
+    places: f64,
+}
+
+impl Together {
+    fn add(mut self, of: &Squares) -> Self {
+        let Squares { sum, dof, common } = &mut self.squares;
+        (*sum, *dof, *common) = (*sum + of.sum, *dof + of.dof, *common + of.common);
+        self.places += f64::from(u8::from(of.dof > 0.0));
+        self
+    }
+
+    /// By how many times they are larger than stated; one where that may be chance. Common errors are the same at all places: the variance
+    /// of the sum, 2 dof for independent ones, is larger by twice `Σ tr(Fᵢ Fⱼ)`, i ≠ j, F being the part of the covariance that is
+    /// theirs, and so there are fewer squares that are independent (Satterthwaite's approximation).
+    fn factor(&self, deviations: f64) -> f64 {
+        let Squares { sum, dof, common } = self.squares;
+        if dof <= 0.0 {
+            return 1.0;
+        }
+        let independent = dof * dof / (dof + common * common * (self.places - 1.0) / dof);
+        if sum / dof * independent > largest_sum(independent, deviations) { sum / dof } else { 1.0 }
+    }
+}
+
 /// For each place, by how many times its variance is larger than stated; one where what its frames and those of the places around see
 /// fits what is stated.
 pub(crate) fn variance_factors(gathered: &Gathered, squares: &[Squares]) -> Vec<f64> {
@@ -92,8 +127,7 @@ pub(crate) fn variance_factors(gathered: &Gathered, squares: &[Squares]) -> Vec<
             let normal = &gathered.estimates[at].normal;
             let places = around.iter().flat_map(|by| cells.of(neighbour(gathered.seeds[at].0, *by)));
             let same = places.filter(|other| gathered.estimates[*other].normal.dot(normal) > ONE_SURFACE);
-            let (sum, dof) = same.fold((0.0, 0.0), |(sum, dof), at| (sum + squares[at].sum, dof + squares[at].dof));
-            if dof > 0.0 && sum > largest_sum(dof, deviations) { sum / dof } else { 1.0 }
+            same.fold(Together::default(), |together, at| together.add(&squares[at])).factor(deviations)
         })
         .collect()
 }

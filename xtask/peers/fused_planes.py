@@ -79,6 +79,8 @@ def planes(points, normals):
         tried = random.choice(left, min(SAMPLES, len(left)), replace=False)
         inside = max((on(points[at], normals[at]) for at in tried), key=np.sum)
         for _ in range(3):
+            if inside.sum() < LEAST:
+                break
             centre = points[inside].mean(0)
             normal = np.linalg.svd(points[inside] - centre, full_matrices=False)[2][2]
             normal *= np.sign(normal @ normals[inside].mean(0))

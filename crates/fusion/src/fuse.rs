@@ -5,13 +5,11 @@ use point_uncertainty::{CommonErrors, PointErrors, Shares, Source};
 use rayon::prelude::*;
 use statistics::upper_median;
 
-use crate::common::{
-    self, Conditioned, Row, Squares, condition, form, noise_factor, split, variance_factors, without_shared,
-};
+use crate::common::{self, Conditioned, Row, Squares, condition, form, split, variance_factors, without_shared};
 use crate::input::{Observation, Observations, Registered};
 use crate::options::{CommonErrorUse, FusionOptions};
 use crate::outcome::{Fused, Surfel};
-use crate::patches::{patches, seeds};
+use crate::patches::{noise_factor, patches, seeds};
 use crate::sight::{self, Scene};
 use crate::surfels::{Bend, Estimate, FARTHEST, Gathered, Owner, bends, gather, give_up, is_even, nonempty};
 use crate::{Error, Result};
@@ -19,6 +17,9 @@ use crate::{Error, Result};
 /// Points that common errors are estimated from, about, in two passes: the second from points that the first has moved to within what
 /// it left. More tell little more than their time. The third is for an error that all frames share: frames that it had set apart meet then.
 const POINTS_FOR_COMMON: [usize; 3] = [60_000, 200_000, 200_000];
+/// Points that their noise is judged by, about, and how many of them lie together.
+const POINTS_FOR_NOISE: usize = 200_000;
+const TOGETHER: usize = 1000;
 /// Common errors, without the nodes of a shared error, beyond which they are not estimated: their dense matrices would take gigabytes.
 const MOST_COMMON: usize = 1500;
 
@@ -44,22 +45,25 @@ pub fn fuse(
         && none.len() - nodes <= MOST_COMMON;
     let task = Task { input, errors, options };
     let mut found = Conditioned::nothing(input.centres.len(), common);
+    let few = thinned(&first, POINTS_FOR_NOISE, TOGETHER);
+    let noise = patches(few.as_ref().unwrap_or(&first), errors, common)?.noise_factor();
+    let noisier = |of: Observations| if noise > 1.0 { of.noisier(noise) } else { of };
+    let mut observations = noisier(first);
     if !estimates {
-        return task.finish(common, &first, found);
+        return task.finish(common, &observations, noise, found);
     }
-    let mut observations = first;
     for (pass, points) in POINTS_FOR_COMMON.into_iter().enumerate() {
         if pass > 1 && found.shared.is_none() {
             break;
         }
-        let few = thinned(&observations, points);
+        let few = thinned(&observations, points, 1);
         let few = few.as_ref().unwrap_or(&observations);
         let present = common_of(common, &found.posterior.covariance)?;
         let patches = patches(few, errors, &present)?;
         found = condition(&task, &found, few, &patches, common, pass > 0)?;
-        observations = input.observe(errors, common, found.posterior.values.as_slice(), options.voxel_m)?;
+        observations = noisier(input.observe(errors, common, found.posterior.values.as_slice(), options.voxel_m)?);
     }
-    task.finish(&common_of(common, &found.posterior.covariance)?, &observations, found)
+    task.finish(&common_of(common, &found.posterior.covariance)?, &observations, noise, found)
 }
 
 /// What is fused, and how.
@@ -86,12 +90,12 @@ fn above_noise(observations: &Observations, options: &FusionOptions) -> Result<(
     Ok(())
 }
 
-/// Some of the points, chosen by their place alone; `None` where all serve.
-fn thinned(observations: &Observations, points: usize) -> Option<Observations> {
+/// Some of the points, chosen by their place alone, so many that are next to each other at a time; `None` where all serve.
+fn thinned(observations: &Observations, points: usize, together: usize) -> Option<Observations> {
     let step = observations.all.len().div_ceil(points);
     (step > 1).then(|| {
         // The order is that of cells and coordinates: it does not know the caller's.
-        let kept = || (0..observations.all.len()).step_by(step);
+        let kept = || (0..observations.all.len()).filter(|at| (at / together).is_multiple_of(step));
         Observations {
             all: kept().map(|at| observations.all[at]).collect(),
             keys: kept().map(|at| observations.keys[at]).collect(),
@@ -101,12 +105,21 @@ fn thinned(observations: &Observations, points: usize) -> Option<Observations> {
 }
 
 impl Task<'_> {
-    /// The fused cloud of points that the common errors which were found have been taken off; `common` are those that remain.
-    fn finish(&self, common: &CommonErrors, observations: &Observations, found: Conditioned) -> Result<Fused> {
+    /// The fused cloud of points that the common errors which were found have been taken off, and whose noise is taken so many times as
+    /// large as stated; `common` are the errors that remain.
+    fn finish(
+        &self,
+        common: &CommonErrors,
+        observations: &Observations,
+        noise: f64,
+        found: Conditioned,
+    ) -> Result<Fused> {
         let Self { input, options, .. } = *self;
         let (mut gathered, mut bends) = self.places(common, observations, &found.layers)?;
-        let noise_factor = noise_factor(&self.rows(&gathered, observations, common)?.1);
-        let noisier = (noise_factor > 1.0).then(|| observations.noisier(noise_factor));
+        let squares = self.rows(&gathered, observations, common)?.1;
+        // Half of the places may be where frames see different things.
+        let between = noise_factor(squares.iter().map(|of| (of.sum, of.dof)), 0.5);
+        let noisier = (between > 1.0).then(|| observations.noisier(between));
         let observations = noisier.as_ref().unwrap_or(observations);
         if noisier.is_some() {
             (gathered, bends) = self.places(common, observations, &found.layers)?;
@@ -139,7 +152,7 @@ impl Task<'_> {
                 contradictions,
                 outvoted,
                 seen_through: fronts.len(),
-                noise_factor,
+                noise_factor: noise * between,
                 apart: found.apart,
                 shared_error: found.shared,
                 corrections: found.posterior.values.iter().copied().collect(),

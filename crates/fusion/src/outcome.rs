@@ -161,8 +161,9 @@ pub struct Fused {
     pub outvoted: usize,
     /// How many of `surfels` a frame has seen through.
     pub seen_through: usize,
-    /// By how many times the noise of points and of their neighbourhoods is larger than stated, in the variance, as most places
-    /// show by what their frames differ by; 1 where it is not. It is in [`Surfel::shares`].
+    /// By how many times the noise of points and of their neighbourhoods is larger than stated, in the variance: as points scatter about
+    /// the flattest quarter of the planes of single frames, times what frames differ by at most places beyond that; 1 where it is not. It is in
+    /// [`Surfel::shares`].
     pub noise_factor: f64,
     /// Stations that do not fit the others.
     pub apart: Vec<Apart>,

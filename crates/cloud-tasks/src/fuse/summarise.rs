@@ -214,7 +214,8 @@ fn findings(summary: &mut FuseSummary, fused: &Fused, is_depth_camera: bool) {
     }
     if fused.noise_factor > 1.0 {
         summary.findings.push(format!(
-            "The noise of points is {:.1} times what is stated of it, as most surfaces show by what frames differ by: it counts as such.",
+            "The noise of points is {:.1} times what is stated of it, as they scatter within frames and frames differ on most surfaces: it counts \
+             as such.",
             fused.noise_factor.sqrt()
         ));
     }

@@ -22,15 +22,11 @@ const REACH: i64 = 3;
 /// Probability that places which err as stated are said to err by more.
 const LEVEL: f64 = 1e-3;
 
-/// Least factor of the noise of all frames that is believed. Simulated rooms whose noise is as stated have 0.83 to 0.95, and up to 1.32
-/// where what is common to frames is not taken off; frames of a Kinect have 1.7 to 2.7.
-const NOISIER: f64 = 1.44;
-
 /// Weighted squares of the differences between the heights of a place's frames, and their degrees of freedom.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Squares {
-    sum: f64,
-    dof: f64,
+    pub sum: f64,
+    pub dof: f64,
     /// Part of the degrees of freedom that belongs to common errors: the trace of `S⁻¹ R C Rᵀ`, both of the differences.
     common: f64,
 }
@@ -69,21 +65,6 @@ impl Squares {
             + others.iter().enumerate().map(|(at, frame)| inverse[at * size + at] * variance(frame)).sum::<f64>();
         Self { sum, dof: size as f64, common: (size as f64 - own).max(0.0) }
     }
-}
-
-/// By how many times noise is larger than stated in all frames, in the variance: the weighted median of the squares of places over the
-/// median of chi-squared, so that half of the places may be where frames see different things. One below [`NOISIER`].
-pub(crate) fn noise_factor(squares: &[Squares]) -> f64 {
-    let ratio = |of: &Squares| (of.sum / Distribution::ChiSquared { dof: of.dof }.quantile(0.5), of.dof);
-    let mut ratios: Vec<(f64, f64)> = squares.iter().filter(|of| of.dof > 0.0).map(ratio).collect();
-    ratios.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let half = 0.5 * ratios.iter().map(|(_, dof)| dof).sum::<f64>();
-    let mut below = 0.0;
-    let median = ratios.iter().find(|(_, dof)| {
-        below += dof;
-        below >= half
-    });
-    median.map(|(ratio, _)| *ratio).filter(|ratio| *ratio > NOISIER).unwrap_or(1.0)
 }
 
 /// Squares of places that are asked together.

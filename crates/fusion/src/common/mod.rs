@@ -9,7 +9,7 @@ mod shared_error;
 mod split;
 mod trust;
 
-pub(crate) use disagreement::{Squares, noise_factor, variance_factors};
+pub(crate) use disagreement::{Squares, variance_factors};
 pub(crate) use isolate::{Conditioned, condition};
 pub(crate) use rows::{Row, form, mean, rows};
 pub(crate) use shared_error::without_shared;

@@ -3,6 +3,7 @@
 //! A frame sees one side of a wall, and one of two walls that bad poses make: planes of single frames mix neither.
 
 mod moments;
+mod noise;
 mod places;
 
 use nalgebra::{Point3, Vector3};
@@ -13,9 +14,13 @@ use crate::Result;
 use crate::input::{NO_NEIGHBOURHOOD, Observations, derivatives};
 use crate::lattice::{Runs, neighbour, neighbours};
 use crate::small::{self, Symmetric};
-use moments::Moments;
+use moments::{Fit, Moments};
 pub(crate) use moments::{LEAST_FACING, Plane, largest_sum, variance_within};
+pub(crate) use noise::noise_factor;
 pub(crate) use places::{ONE_SURFACE, Seed, seeds};
+
+/// Part of the patches by which noise is judged, those of the least squares: shapes, edges and what lies about make others of more.
+const FLAT_SHARE: f64 = 0.25;
 
 /// What one frame saw in one cell.
 pub(crate) struct Patch {
@@ -24,7 +29,12 @@ pub(crate) struct Patch {
     /// Covariance of a point there from common errors, square metre.
     pub common: Symmetric,
     pub plane: Option<Plane>,
+    /// Of the frame's points about their plane, over their variances, and their degrees of freedom.
+    squares: Option<(f64, f64)>,
 }
+
+/// What is found of a patch: plane, and squares as there.
+type Found = (Option<Plane>, Option<(f64, f64)>);
 
 /// Patches by cells.
 pub(crate) struct Patches {
@@ -38,6 +48,11 @@ impl Patches {
     /// The patches of a cell.
     pub fn of(&self, cell: usize) -> &[Patch] {
         &self.all[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// By how many times the noise of points within single frames is larger than stated, in the variance.
+    pub fn noise_factor(&self) -> f64 {
+        noise_factor(self.all.iter().filter_map(|patch| patch.squares), FLAT_SHARE)
     }
 
     /// The patch of a frame in a cell.
@@ -62,13 +77,13 @@ pub(crate) fn patches(observations: &Observations, errors: &dyn PointErrors, com
     }
     let mut patches = Patches { cells, all, starts };
     let near = neighbours(1);
-    let planes: Vec<Vec<Option<Plane>>> = (0..patches.cells.keys.len())
+    let found: Vec<Vec<Found>> = (0..patches.cells.keys.len())
         .into_par_iter()
         .with_min_len(64)
         .map(|cell| planes(cell, &patches, observations, &near))
         .collect();
-    for (patch, plane) in patches.all.iter_mut().zip(planes.into_iter().flatten()) {
-        patch.plane = plane;
+    for (patch, (plane, squares)) in patches.all.iter_mut().zip(found.into_iter().flatten()) {
+        (patch.plane, patch.squares) = (plane, squares);
     }
     Ok(patches)
 }
@@ -92,7 +107,13 @@ fn in_cell(
             // Common errors vary slowly: one point of the patch stands for all.
             derivatives(observation.index as usize, errors, common, buffer)?;
             let common = covariance(buffer, common);
-            found.push(Patch { frame: observation.frame, moments: Moments::default(), common, plane: None });
+            found.push(Patch {
+                frame: observation.frame,
+                moments: Moments::default(),
+                common,
+                plane: None,
+                squares: None,
+            });
             seen.push(Vec::new());
             found.len() - 1
         };
@@ -123,7 +144,7 @@ fn covariance(derivatives: &[(usize, Vector3<f64>)], common: &CommonErrors) -> S
 
 /// The planes of a cell's patches: through the points of the cells around where these are flat, else of the cell alone;
 /// where a frame has too few points, through those of all frames that look the same way.
-fn planes(cell: usize, patches: &Patches, observations: &Observations, near: &[i64]) -> Vec<Option<Plane>> {
+fn planes(cell: usize, patches: &Patches, observations: &Observations, near: &[i64]) -> Vec<Found> {
     let lattice = &observations.lattice;
     let key = patches.cells.keys[cell];
     let centre = lattice.centre(key);
@@ -134,7 +155,7 @@ fn planes(cell: usize, patches: &Patches, observations: &Observations, near: &[i
         .collect();
     let own = patches.of(cell);
     let mut any_enough = false;
-    let mut found: Vec<Option<Plane>> = own
+    let mut found: Vec<Found> = own
         .iter()
         .map(|patch| {
             let mut window = Moments::default();
@@ -145,15 +166,21 @@ fn planes(cell: usize, patches: &Patches, observations: &Observations, near: &[i
             }
             any_enough |= window.has_enough();
             let none = [0.0; 6];
-            let alone = || patch.moments.plane(&centre, lattice.size_m, &none).map(weak);
-            window.plane(&centre, lattice.size_m, &none).or_else(alone)
+            let [wide, alone] = [&window, &patch.moments].map(|moments| moments.fit(lattice.size_m, &none));
+            let plane = |fit: Fit| fit.plane(&centre, lattice.size_m);
+            let squares = |fit: Fit| fit.squares(lattice.size_m);
+            // A bent surface is flatter within its cell.
+            (
+                wide.and_then(plane).or_else(|| alone.and_then(plane).map(weak)),
+                alone.and_then(squares).or_else(|| wide.and_then(squares)),
+            )
         })
         .collect();
-    if !any_enough && let Some(first) = found.first_mut() {
+    if !any_enough && let Some((first, _)) = found.first_mut() {
         *first = together(&own[0], patches, &around, &centre, lattice.size_m);
     }
     let alone = [(cell, Vector3::zeros())];
-    for (plane, patch) in found.iter_mut().zip(own).filter(|(plane, _)| plane.is_none()) {
+    for ((plane, _), patch) in found.iter_mut().zip(own).filter(|((plane, _), _)| plane.is_none()) {
         *plane = together(patch, patches, &alone, &centre, lattice.size_m).map(weak);
     }
     found
@@ -177,5 +204,5 @@ fn together(
             window.include(&patch.moments, shift);
         }
     }
-    window.plane(centre, voxel_m, &like.common)
+    window.fit(voxel_m, &like.common)?.plane(centre, voxel_m)
 }

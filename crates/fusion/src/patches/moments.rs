@@ -22,6 +22,10 @@ const LARGEST_TILT: f64 = 0.15;
 const FIRM_TILT: f64 = 0.06;
 /// Unevenness of surfaces that are flat, cells: where light grazes, noise along the normal vanishes and this is left.
 const UNEVEN: f64 = 0.004;
+/// Unevenness that is no noise, cells: a radius of curvature of five cells within one.
+const SHAPED: f64 = 0.01;
+/// Least square of the width of points over their thickness where noise is asked for.
+const FLAT_2: f64 = 4.0;
 /// Least cosine between normal and ray: below it a pixel covers more than twelve times its width, and noise along the normal is
 /// that of the normal.
 pub(crate) const LEAST_FACING: f64 = 0.08;
@@ -52,6 +56,40 @@ pub(crate) struct Plane {
     pub tilt_variance: f64,
     /// Whether it goes through points of the cells around as well.
     pub is_firm: bool,
+}
+
+/// The plane that fits points best, whether they lie on it or not.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fit {
+    plane: Plane,
+    /// Independent heights, and the degrees of freedom of their squares.
+    free: f64,
+    dof: f64,
+    /// Variance of a height, square metre.
+    expected: f64,
+    /// Second moments, square metre: along the narrower side of the plane, and of the heights.
+    width_2: f64,
+    thickness_2: f64,
+    is_seen: bool,
+}
+
+impl Fit {
+    /// The plane, where the points about the centre lie on one.
+    pub fn plane(&self, centre: &Point3<f64>, voxel_m: f64) -> Option<Plane> {
+        static DEVIATIONS: LazyLock<f64> = LazyLock::new(|| Distribution::Normal.upper_quantile(LEVEL));
+        let is_wide = self.width_2 > (LEAST_WIDTH * voxel_m).powi(2);
+        let is_told = is_wide && self.plane.tilt_variance < LARGEST_TILT * LARGEST_TILT && self.is_seen;
+        (is_told && self.thickness_2 * self.free < self.expected * largest_sum(self.dof, *DEVIATIONS))
+            .then(|| Plane { point: centre + self.plane.point.coords, ..self.plane })
+    }
+
+    /// Squares of the heights over their variances and the degrees of freedom, where the points are so much wider than thick that noise has
+    /// not chosen what is across.
+    pub fn squares(&self, voxel_m: f64) -> Option<(f64, f64)> {
+        let expected = self.expected + (SHAPED * voxel_m).powi(2);
+        let is_flat = self.is_seen && self.width_2 > FLAT_2 * self.thickness_2;
+        is_flat.then_some((self.thickness_2 * self.free / expected, self.dof))
+    }
 }
 
 impl Moments {
@@ -93,12 +131,10 @@ impl Moments {
         self.count >= FEWEST_POINTS
     }
 
-    /// The plane through the points, where they lie on one; `common` is the covariance of what those of one frame have in common and
-    /// those of others have not.
+    /// The plane that fits best, from the centre of the sums; `common` is the covariance of what points of one frame have in common and those of others have not.
     ///
     /// Noise along the ray tilts the principal axes of scattered points; the scatter that it causes is taken off before.
-    pub fn plane(&self, centre: &Point3<f64>, voxel_m: f64, common: &Symmetric) -> Option<Plane> {
-        static DEVIATIONS: LazyLock<f64> = LazyLock::new(|| Distribution::Normal.upper_quantile(LEVEL));
+    pub fn fit(&self, voxel_m: f64, common: &Symmetric) -> Option<Fit> {
         if !self.has_enough() {
             return None;
         }
@@ -119,19 +155,25 @@ impl Moments {
         let uneven = (UNEVEN * voxel_m).powi(2);
         let expected = noise + sensor + uneven + small::quadratic(common, &normal);
         let of_mean = (expected - sensor) / self.count + sensor / self.neighbourhoods;
-        let tilt_variance = of_mean / values[1];
         // Satterthwaite: a sum of squares of which a part is common to neighbourhoods varies as one of so many free ones.
         let crowd = self.count / self.neighbourhoods;
         let free = self.count / (1.0 + (crowd - 1.0) * (sensor / expected).powi(2));
-        let is_wide = values[1] > (LEAST_WIDTH * voxel_m).powi(2) && tilt_variance < LARGEST_TILT * LARGEST_TILT;
-        let is_seen = -normal.dot(&self.ray) > LEAST_FACING * self.ray.norm();
-        let found = small::quadratic(&scatter, &normal) * free;
-        (is_wide && is_seen && found < expected * largest_sum((free - 3.0).max(1.0), *DEVIATIONS)).then(|| Plane {
-            point: centre + mean,
+        let tilt_variance = of_mean / values[1];
+        let plane = Plane {
+            point: Point3::from(mean),
             normal,
             variance: (noise + uneven) / self.count + sensor / self.neighbourhoods,
             tilt_variance,
             is_firm: tilt_variance < FIRM_TILT * FIRM_TILT,
+        };
+        Some(Fit {
+            plane,
+            free,
+            dof: (free - 3.0).max(1.0),
+            expected,
+            width_2: values[1],
+            thickness_2: small::quadratic(&scatter, &normal),
+            is_seen: -normal.dot(&self.ray) > LEAST_FACING * self.ray.norm(),
         })
     }
 }

@@ -3,8 +3,9 @@ fused_planes.py CLOUD [RESULT].
 
 CLOUD is the `cloud.ply` that `rangecam fuse` wrote. Large planes are found in it by samples of single fused points, the largest first:
 fused points within TOLERANCE and ANGLE, connected over cells of CELL. On each, planes are fitted within RADIUS about every third point,
-so that what bends a whole wall is no scatter. Prints for each plane, and for all together, the robust scatter in millimetres, and
-robust and root mean square scatter over the stated deviations (1: as stated). With the `cloud.ply` that was fused as RESULT, also the robust
+so that what bends a whole wall is no scatter, and what neighbours have in common neither. Prints for each plane, and for all together, the
+robust scatter in millimetres, robust and root mean square scatter over the deviations that are stated of the points' own errors
+(`sigma_own`; 1: as stated), and robust over those with what points have in common (`sigma`). With the `cloud.ply` that was fused as RESULT, also the robust
 scatter of the points of single frames about planes of their own, fitted within RADIUS on the same walls: how thick a section is in one frame.
 """
 import re
@@ -37,7 +38,7 @@ def columns(cloud, names):
 def fused_points(path):
     cloud = read(path)
     normals = [name for name in cloud.dtype.names if re.fullmatch("n[xyz]|normal_[xyz]", name)]
-    return columns(cloud, "xyz"), columns(cloud, normals), cloud["sigma"].astype(float)
+    return columns(cloud, "xyz"), columns(cloud, normals), columns(cloud, ["sigma_own", "sigma"])
 
 
 def points_of_frames(path):
@@ -98,17 +99,17 @@ def off_plane(points, weights):
 
 
 def scatter(points, sigma):
-    """Distances from the planes about every third point, and the same over the stated deviations."""
-    distances, standardised = [], []
+    """Distances from the planes about every third point, and the same over both stated deviations."""
+    distances, standardised, own = [], [], sigma[:, 0]
     for centre in points[::3]:
         near = ((points - centre) ** 2).sum(1) < RADIUS**2
         count = near.sum()
         if count >= FEWEST:
             # What the plane itself takes of them.
-            off = off_plane(points[near], 1 / sigma[near] ** 2) * np.sqrt(count / (count - 3))
+            off = off_plane(points[near], 1 / own[near] ** 2) * np.sqrt(count / (count - 3))
             distances.extend(off)
-            standardised.extend(off / sigma[near])
-    return np.array(distances), np.array(standardised)
+            standardised.extend(off[:, None] / sigma[near])
+    return np.array(distances), np.array(standardised).reshape(-1, 2)
 
 
 def robust(values):
@@ -143,8 +144,10 @@ def scatter_of_frames(part, points, frames):
 
 
 def line(name, distances, standardised):
-    square = np.sqrt(np.mean(standardised**2))
-    return f"{name}: {1e3 * robust(distances):.2f} mm, over stated {robust(standardised):.2f} (root mean square {square:.2f})"
+    own, all_sources = standardised.T
+    square = np.sqrt(np.mean(own**2))
+    over = f"over stated {robust(own):.2f} (root mean square {square:.2f}; with all sources {robust(all_sources):.2f})"
+    return f"{name}: {1e3 * robust(distances):.2f} mm, {over}"
 
 
 def main(path, result=None):

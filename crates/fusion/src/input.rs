@@ -88,15 +88,15 @@ pub(crate) struct Observations {
 }
 
 impl Observations {
-    /// The same with `factor` times the variances of noise and neighbourhoods.
-    pub fn noisier(&self, factor: f64) -> Self {
-        let (variance, deviation) = (factor as f32, factor.sqrt() as f32);
-        let noisier = |of: &Observation| Observation {
-            noise: of.noise.map(|v| v * variance),
-            shift: of.shift.map(|v| v * deviation),
-            ..*of
+    /// The same with so many times the variances of noise and neighbourhoods, by the place of an observation.
+    pub fn noisier(&self, factor: impl Fn(usize) -> f64 + Sync) -> Self {
+        let noisier = |(at, of): (usize, &Observation)| {
+            let factor = factor(at);
+            let (variance, deviation) = (factor as f32, factor.sqrt() as f32);
+            Observation { noise: of.noise.map(|v| v * variance), shift: of.shift.map(|v| v * deviation), ..*of }
         };
-        Self { all: self.all.par_iter().map(noisier).collect(), keys: self.keys.clone(), lattice: self.lattice }
+        let all = self.all.par_iter().enumerate().map(noisier).collect();
+        Self { all, keys: self.keys.clone(), lattice: self.lattice }
     }
 }
 

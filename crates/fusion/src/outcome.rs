@@ -36,6 +36,13 @@ impl Surfel {
         (self.shares.variance() + self.disagreement_variance() + self.shape_variance).sqrt()
     }
 
+    /// The part of it that its points alone err by, metre: noise, neighbourhoods and shape, as frames show them, without what many points
+    /// have in common. Fused points beside each other scatter by so much.
+    pub fn own_sigma_m(&self) -> f64 {
+        let own = self.shares.of(Source::Noise) + self.shares.of(Source::Sensor);
+        (own * self.variance_factor + self.shape_variance).sqrt()
+    }
+
     /// What the disagreement of frames adds to the variance that the sources state, square metre.
     pub fn disagreement_variance(&self) -> f64 {
         (self.variance_factor - 1.0) * self.shares.variance()

@@ -42,6 +42,22 @@ fn assert_same(found: &CloudFile, expected: &CloudFile) {
     }
 }
 
+#[test]
+fn the_own_part_of_sigma_is_written_and_not_read() {
+    let scratch = Scratch::new();
+    for name in ["own.ply", "own.pcd", "own.e57"] {
+        let expected = scratch::cloud(7);
+        let with_own = CloudFile { sigma_own: Some(vec![0.001; 7]), ..expected.clone() };
+        write_any_cloud(scratch.file(name), &with_own, Precision::Double).unwrap();
+        assert_same(&read_any_cloud(scratch.file(name)).unwrap(), &expected);
+        let bytes = std::fs::read(scratch.file(name)).unwrap();
+        assert!(bytes.windows(9).any(|window| window == b"sigma_own"), "{name}");
+        let short = CloudFile { sigma_own: Some(vec![0.001; 6]), ..expected };
+        let fault = write_any_cloud(scratch.file(name), &short, Precision::Double).unwrap_err().to_string();
+        assert!(fault.contains("`sigma_own`: has 6 values for 7 points"), "{fault}");
+    }
+}
+
 proptest! {
     #![proptest_config(common::cases(32))]
 

@@ -27,6 +27,7 @@ pub(crate) fn write_fused(path: impl AsRef<Path>, fused: &Fused) -> Result<()> {
         normals: Some(surfels.iter().map(|surfel| surfel.normal.map(|value| value as f32).into()).collect()),
         intensity: has_amplitudes.then(|| surfels.iter().map(|surfel| surfel.amplitude as f32).collect()),
         sigma: Some(surfels.iter().map(|surfel| surfel.sigma_m() as f32).collect()),
+        sigma_own: Some(surfels.iter().map(|surfel| surfel.own_sigma_m() as f32).collect()),
         ..CloudFile::default()
     };
     Ok(write_any_cloud(path, &cloud, Precision::Single)?)

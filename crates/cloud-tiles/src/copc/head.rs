@@ -108,6 +108,7 @@ fn further_value(name: &str, number: u8) -> Vec<u8> {
     let words = match name {
         "amplitude" => "unit of the camera",
         "sigma" => "deviation, metre",
+        "sigma_own" => "own part of it, metre",
         "flags" => "bits of pixel flags",
         "frame" => "frame of the result",
         _ => "",

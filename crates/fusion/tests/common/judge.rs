@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use fusion::nalgebra::{DVector, Matrix3, Vector3};
-use fusion::point_uncertainty::Source;
 use fusion::{Fused, Surfel};
 
 use super::scene::SPHERE;
@@ -42,9 +41,8 @@ impl Judgement {
             }
             if let Some(face) = survey.scene.faces.get(surface) {
                 let aside = [(face.axis + 1) % 3, (face.axis + 2) % 3].map(|k| surfel.position[k]);
-                let own = surfel.shares.of(Source::Noise) + surfel.shares.of(Source::Sensor);
                 let row = Vector3::new(1.0, aside[0], aside[1]);
-                walls.entry(surface).or_default().push((row, height, (own + surfel.shape_variance).sqrt()));
+                walls.entry(surface).or_default().push((row, height, surfel.own_sigma_m()));
             }
         }
         self.thickness.extend(walls.values().filter(|wall| wall.len() >= 100).map(|wall| thickness(wall)));

@@ -13,6 +13,8 @@ pub struct CloudFile {
     pub intensity: Option<Vec<f32>>,
     /// Standard deviation along the ray in metres.
     pub sigma: Option<Vec<f32>>,
+    /// The part of it in metres that is the point's own: without what many points have in common. Written, and not read.
+    pub sigma_own: Option<Vec<f32>>,
     /// Bits of [`range_image::Flags`](https://docs.rs/range-image).
     pub flags: Option<Vec<u16>>,
     /// Frame each point comes from.
@@ -81,6 +83,7 @@ impl CloudFile {
             ("normals", self.normals.as_ref().map(Vec::len)),
             ("intensity", self.intensity.as_ref().map(Vec::len)),
             ("sigma", self.sigma.as_ref().map(Vec::len)),
+            ("sigma_own", self.sigma_own.as_ref().map(Vec::len)),
             ("flags", self.flags.as_ref().map(Vec::len)),
             ("frame", self.frame.as_ref().map(Vec::len)),
             ("covariance", self.covariance.as_ref().map(Vec::len)),

@@ -41,6 +41,7 @@ pub(crate) fn put_point(bytes: &mut Vec<u8>, cloud: &CloudFile, index: usize, pr
     cloud.normals.iter().for_each(|normals| normals[index].into_iter().for_each(&mut put));
     cloud.intensity.iter().for_each(|values| put(values[index]));
     cloud.sigma.iter().for_each(|values| put(values[index]));
+    cloud.sigma_own.iter().for_each(|values| put(values[index]));
     cloud.flags.iter().for_each(|values| bytes.extend_from_slice(&values[index].to_le_bytes()));
     cloud.frame.iter().for_each(|values| bytes.extend_from_slice(&values[index].to_le_bytes()));
     let mut put = |value: f32| bytes.extend_from_slice(&value.to_le_bytes());

@@ -183,6 +183,7 @@ fn picked(cloud: &CloudFile, indices: &[Option<usize>]) -> CloudFile {
     }
     CloudFile {
         colours: None,
+        sigma_own: None,
         points: pick(Some(&cloud.points), indices, [f64::NAN; 3]).unwrap_or_default(),
         normals: pick(cloud.normals.as_ref(), indices, [f32::NAN; 3]),
         intensity: pick(cloud.intensity.as_ref(), indices, f32::NAN),

@@ -30,7 +30,9 @@ pub fn write_e57(path: impl AsRef<Path>, scans: &[E57Scan], precision: Precision
         let [name, url] = fields::NORMALS;
         writer.register_extension(Extension::new(name, url)).map_err(failed)?;
     }
-    if has(|c| c.sigma.is_some() || c.flags.is_some() || c.frame.is_some() || c.covariance.is_some()) {
+    if has(|c| {
+        c.sigma.is_some() || c.sigma_own.is_some() || c.flags.is_some() || c.frame.is_some() || c.covariance.is_some()
+    }) {
         let [name, url] = fields::OWN;
         writer.register_extension(Extension::new(name, url)).map_err(failed)?;
     }
@@ -125,6 +127,7 @@ impl<'a> Layout<'a> {
             add(cloud.normals.is_some(), fields::normal(axis), single());
         }
         add(cloud.sigma.is_some(), fields::own("sigma"), single());
+        add(cloud.sigma_own.is_some(), fields::own("sigma_own"), single());
         add(cloud.flags.is_some(), fields::own("flags"), whole(usize::from(u16::MAX)));
         add(cloud.frame.is_some(), fields::own("frame"), whole(u32::MAX as usize));
         for name in COVARIANCE {
@@ -160,7 +163,7 @@ impl<'a> Layout<'a> {
             values.push(RecordValue::Integer((index % width.max(1)) as i64));
         }
         values.extend(cloud.normals.iter().flat_map(|normals| normals[index]).map(RecordValue::Single));
-        values.extend(cloud.sigma.iter().map(|sigma| RecordValue::Single(sigma[index])));
+        values.extend(cloud.sigma.iter().chain(&cloud.sigma_own).map(|sigma| RecordValue::Single(sigma[index])));
         values.extend(cloud.flags.iter().map(|flags| RecordValue::Integer(i64::from(flags[index]))));
         values.extend(cloud.frame.iter().map(|frame| RecordValue::Integer(i64::from(frame[index]))));
         values.extend(cloud.covariance.iter().flat_map(|terms| terms[index]).map(RecordValue::Single));

@@ -156,3 +156,22 @@ fn a_plane_does_not_tell_how_frames_slid_along_it() {
         assert!(left(frames + frame) > 0.65 && left(frame) < 0.6, "{} {}", left(frames + frame), left(frame));
     }
 }
+
+#[test]
+fn a_wall_that_frames_see_ever_further_away_stands_once() {
+    // From x = 0.6 m on each of eight frames sees it some millimetres behind where the one before does, which nothing states.
+    let mut wall = Wall::new(8, 100, 0.004, 0.0, 1e-5, 31);
+    for (point, frame) in wall.points.iter_mut().zip(&wall.frames) {
+        if point.x > 0.6 {
+            point.z -= 0.003 * f64::from(*frame);
+        }
+    }
+    let fused = fuse(&wall.registered(), &wall, &wall.common, &FusionOptions::default()).unwrap();
+    let there: Vec<_> = fused.surfels.iter().filter(|surfel| surfel.position.x > 0.7).collect();
+    let heights: Vec<f64> = there.iter().map(|surfel| surfel.position.z).collect();
+    let scatter = statistics::robust_standard_deviation(&heights);
+    let sigma = statistics::quantile(&mut there.iter().map(|surfel| surfel.sigma_m()).collect::<Vec<_>>(), 0.5);
+    // In layers there were 507, 8.3 mm apart and stated to 2.9 mm, and 77 contradictions.
+    assert!(scatter < sigma && sigma < 0.005 && there.len() < 300, "{scatter}, {sigma}, {}", there.len());
+    assert!(fused.contradictions.is_empty(), "{:?}", fused.contradictions);
+}

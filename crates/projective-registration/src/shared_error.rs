@@ -10,9 +10,9 @@
 use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use statistics::SIGMA_OF_MAD;
 
+use crate::partners::locate::with_locate;
 use crate::partners::map::Agreement;
 use crate::partners::map::{Partner, Partners};
-use crate::partners::pairs::with_locate;
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::frame::OrganisedFrame;
 use icp_registration::TUKEY;

@@ -7,7 +7,8 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::SAME_SURFACE_COSINE;
 
-use crate::partners::pairs::{Locate, Moved, WithLocate, node_at, with_locate};
+use crate::partners::locate::{Locate, WithLocate, node_at, with_locate};
+use crate::partners::pairs::Moved;
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::BLOCK;
 use rigid_pose::SinglePose;

@@ -11,89 +11,12 @@ use icp_registration::TUKEY;
 use nalgebra::{Isometry3, Vector3};
 use point_cloud::SAME_SURFACE_COSINE;
 
+use crate::partners::locate::Locate;
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
-use crate::preparation::grid::{BLOCK, Grid};
-use crate::preparation::projection::Lens;
-use crate::preparation::table::Table;
+use crate::preparation::grid::BLOCK;
+use crate::preparation::node_table::whole;
 use rigid_pose::SinglePose;
-
-/// Above the number of nodes of any frame: from there on single precision holds whole numbers, in its low bits.
-const TWO_TO_23: f32 = 8_388_608.0;
-
-/// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
-pub(crate) trait Locate: Copy + Sync {
-    fn node(&self, u: f32, v: f32) -> [f32; 2];
-}
-
-/// A pinhole camera, in nodes.
-#[derive(Clone, Copy)]
-pub(crate) struct Pinhole {
-    focal: [f32; 2],
-    centre: [f32; 2],
-}
-
-impl Locate for Pinhole {
-    #[inline(always)]
-    fn node(&self, u: f32, v: f32) -> [f32; 2] {
-        [u * self.focal[0] + self.centre[0], self.centre[1] - v * self.focal[1]]
-    }
-}
-
-/// A table of pixels and the number of pixels a node.
-#[derive(Clone, Copy)]
-pub(crate) struct Tabled<'a> {
-    table: &'a Table,
-    scale: f32,
-    shift: f32,
-}
-
-impl Locate for Tabled<'_> {
-    #[inline(always)]
-    fn node(&self, u: f32, v: f32) -> [f32; 2] {
-        let [col, row] = self.table.read(u, v);
-        [col * self.scale + self.shift, row * self.scale + self.shift]
-    }
-}
-
-/// Something to be done with whatever camera the target has, compiled for wide registers where it is inlined.
-pub(crate) trait WithLocate {
-    type Output;
-    fn run<L: Locate>(self, locate: L) -> Self::Output;
-}
-
-/// Does work with a camera, in wide registers.
-pub(crate) fn run_wide<W: WithLocate, L: Locate>(work: W, locate: L) -> W::Output {
-    pulp::Arch::new().dispatch(Wide { work, locate })
-}
-
-struct Wide<W, L> {
-    work: W,
-    locate: L,
-}
-
-impl<W: WithLocate, L: Locate> pulp::WithSimd for Wide<W, L> {
-    type Output = W::Output;
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> W::Output {
-        self.work.run(self.locate)
-    }
-}
-
-/// Calls `work` with the camera of a frame.
-pub(crate) fn with_locate<W: WithLocate>(frame: &OrganisedFrame, work: W) -> W::Output {
-    let bin = frame.grid.bin as f64;
-    // Pixel p lies at node (p - (bin - 1) / 2) / bin.
-    let shift = -(bin - 1.0) / 2.0;
-    match frame.projection().lens() {
-        Lens::Pinhole { focal_px, centre_px } => {
-            let focal = focal_px.map(|f| (f / bin) as f32);
-            run_wide(work, Pinhole { focal, centre: centre_px.map(|c| ((c + shift) / bin) as f32) })
-        }
-        Lens::Table(table) => run_wide(work, Tabled { table, scale: (1.0 / bin) as f32, shift: (shift / bin) as f32 }),
-    }
-}
 
 /// What decides on pairs and their weights.
 #[derive(Debug, Clone, Copy, Default)]
@@ -109,16 +32,6 @@ impl Rules {
     pub(crate) fn reach(self) -> f32 {
         self.widening * TUKEY as f32
     }
-}
-
-/// The node on which a point in the frame of the camera falls.
-#[inline]
-pub(crate) fn node_at<L: Locate>(grid: &Grid, locate: L, p: [f32; 3]) -> Option<usize> {
-    let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]);
-    let (col, row) = (col + 0.5, row + 0.5);
-    // NaN fails.
-    let inside = p[2] < 0.0 && col >= 0.0 && row >= 0.0 && col < grid.cols as f32 && row < grid.rows as f32;
-    inside.then(|| row as usize * grid.cols + col as usize)
 }
 
 /// The source frame on its way to the target.
@@ -269,11 +182,15 @@ impl<'a> Moved<'a> {
         let grid = &self.target.grid;
         let (cols, rows) = (grid.cols as f32, grid.rows as f32);
         let (most_col, most_row) = (cols - 0.5, rows - 0.5);
-        let (mut node, mut outside) = ([0; BLOCK], [0.0; BLOCK]);
+        let (mut u, mut v) = ([0.0; BLOCK], [0.0; BLOCK]);
         for k in 0..BLOCK {
             let per_depth = -1.0 / p[2][k];
-            let [col, row] = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
-            let (col, row) = (col + 0.5, row + 0.5);
+            (u[k], v[k]) = (p[0][k] * per_depth, p[1][k] * per_depth);
+        }
+        let [at_col, at_row] = locate.nodes(&u, &v);
+        let (mut node, mut outside) = ([0; BLOCK], [0.0; BLOCK]);
+        for k in 0..BLOCK {
+            let (col, row) = (at_col[k] + 0.5, at_row[k] + 0.5);
             // NaN fails.
             let inside = (p[2][k] < 0.0) & (col >= 0.0) & (row >= 0.0) & (col < cols) & (row < rows);
             outside[k] = if inside { 0.0 } else { f32::NAN };
@@ -281,8 +198,7 @@ impl<'a> Moved<'a> {
             let (col, row) = (if col > 0.0 { col } else { 0.0 }, if row > 0.0 { row } else { 0.0 });
             let col = if col < most_col { col } else { most_col };
             let row = if row < most_row { row } else { most_row };
-            // Whole numbers below 2²³ as the low bits of their sum with it: a cast would be done lane by lane.
-            node[k] = (row.floor() * cols + col.floor() + TWO_TO_23).to_bits() ^ TWO_TO_23.to_bits();
+            node[k] = whole(row.floor() * cols + col.floor());
         }
         let (mut nodes, mut variances) = ([[f32::NAN; 4]; BLOCK], [f32::NAN; BLOCK]);
         for k in 0..BLOCK {

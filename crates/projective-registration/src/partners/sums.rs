@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use rigid_pose::MotionEquations;
 
-use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_locate};
+use crate::partners::locate::{Locate, WithLocate, run_wide, with_locate};
+use crate::partners::pairs::{Moved, Pairs};
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::BLOCK;

@@ -11,7 +11,8 @@ use std::ops::Add;
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::partners::pairs::{Locate, Moved, WithLocate, with_locate};
+use crate::partners::locate::{Locate, WithLocate, with_locate};
+use crate::partners::pairs::Moved;
 use crate::partners::track::Frames;
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;

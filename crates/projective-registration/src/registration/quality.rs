@@ -14,7 +14,8 @@ use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_locate};
+use crate::partners::locate::{Locate, WithLocate, run_wide, with_locate};
+use crate::partners::pairs::{Moved, Pairs};
 use crate::partners::sums::{self, Normal, derivatives};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};

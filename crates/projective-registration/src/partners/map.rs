@@ -4,6 +4,8 @@
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 
+use std::ops::Range;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::SAME_SURFACE_COSINE;
 
@@ -94,10 +96,13 @@ impl OrganisedFrame {
 
     /// Moves the planes of this frame to the weighted mean with the points of `source`, those within their noise.
     pub fn absorb(&mut self, source: &Self, self_from_source: &Isometry3<f64>, scratch: &mut Vec<(u32, f32, f32)>) {
-        scratch.clear();
+        let most = source.points.blocks.len() * BLOCK;
+        if scratch.len() < most {
+            scratch.resize(most, (0, 0.0, 0.0));
+        }
         let moved = Moved::new(source, self, self_from_source, &Vector3::zeros(), 1.0);
-        with_locate(self, Learning { moved: &moved, learned: scratch });
-        for &(node, residual, source_variance) in scratch.iter() {
+        let count = with_locate(self, Learning { moved: &moved, learned: scratch });
+        for &(node, residual, source_variance) in &scratch[..count] {
             let (plane, sigma) = (&mut self.planes[node as usize], &mut self.sigma[node as usize]);
             let variance = *sigma * *sigma;
             let gain = (variance / (variance + source_variance)).max(1.0 / MEMORY);
@@ -155,11 +160,21 @@ impl OrganisedFrame {
     /// The planes as they are now, as points on the rays of their nodes with normals towards the camera and sigma along
     /// them.
     pub fn surface(&self) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>, f64)> {
-        (0..self.grid.len()).filter_map(|k| {
+        self.surface_of(0..self.nodes())
+    }
+
+    /// The same of some nodes; none beyond [`nodes`](Self::nodes).
+    pub fn surface_of(&self, nodes: Range<usize>) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>, f64)> {
+        (nodes.start..nodes.end.min(self.nodes())).filter_map(|k| {
             let (point, normal) = self.node(k)?;
             let normal = -Vector3::from(normal.map(f64::from)).normalize();
             Some((Point3::from(point.map(f64::from)), normal, f64::from(self.sigma[k])))
         })
+    }
+
+    /// Number of nodes, with and without a plane.
+    pub fn nodes(&self) -> usize {
+        self.grid.len()
     }
 
     /// Fraction of the nodes that have a plane.
@@ -234,15 +249,18 @@ impl Partner {
 /// The planes on which nodes fall within their noise, with distance and variance of the nodes.
 struct Learning<'a, 'b> {
     moved: &'a Moved<'b>,
-    learned: &'a mut Vec<(u32, f32, f32)>,
+    /// With room for all nodes.
+    learned: &'a mut [(u32, f32, f32)],
 }
 
 impl WithLocate for Learning<'_, '_> {
-    type Output = ();
+    /// How many there are.
+    type Output = usize;
 
     #[inline(always)]
-    fn run<L: Locate>(self, locate: L) {
+    fn run<L: Locate>(self, locate: L) -> usize {
         let Self { moved, learned } = self;
+        let mut count = 0;
         for block in &moved.source.points.blocks {
             let d = moved.distances(locate, block);
             let mut fits = [false; BLOCK];
@@ -252,11 +270,12 @@ impl WithLocate for Learning<'_, '_> {
                     d.residual[k] * d.residual[k] < 9.0 * d.variance[k] && d.cosine[k] >= SAME_SURFACE_COSINE as f32;
             }
             for k in 0..BLOCK {
-                if fits[k] {
-                    learned.push((d.node[k], d.residual[k], block.variance[k]));
-                }
+                // No branches: half of them would be guessed wrong at edges.
+                learned[count] = (d.node[k], d.residual[k], block.variance[k]);
+                count += usize::from(fits[k]);
             }
         }
+        count
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::preparation::legendre::{DEGREE, legendre_along};
 use crate::preparation::node_table::NodeTable;
 use crate::preparation::projection::Lens;
 
@@ -47,6 +48,8 @@ pub(crate) struct Grid {
     pub v: Vec<f32>,
     /// Cosine between the rays and the optical axis.
     pub cosine: Vec<f32>,
+    /// Legendre polynomials at the columns and at the rows of nodes.
+    pub legendre: [Vec<[f64; DEGREE + 1]>; 2],
     /// Turns the gradient of a function along columns and rows of nodes into that along u and v:
     /// `du = m[0] dc + m[1] dr`, `dv = m[2] dc + m[3] dr`.
     pub gradient: Vec<[f32; 4]>,
@@ -108,6 +111,7 @@ impl Grid {
             u: rays.iter().map(|r| r[0] as f32).collect(),
             v: rays.iter().map(|r| r[1] as f32).collect(),
             cosine: rays.iter().map(|r| (1.0 / (1.0 + r[0] * r[0] + r[1] * r[1]).sqrt()) as f32).collect(),
+            legendre: [cols, rows].map(legendre_along),
             gradient,
         }
     }

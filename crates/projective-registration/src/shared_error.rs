@@ -7,6 +7,9 @@
 //! expectation 0 and, by degree, variances that are estimated from the residuals of registrations beside their random
 //! part (quadratic and unbiased `[Rao1971]`): residuals of neighbours differ by the random part alone.
 
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+
 use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use statistics::SIGMA_OF_MAD;
 
@@ -233,6 +236,7 @@ impl OrganisedFrame {
         reduced(sightings, &to_tangent, scratch)
     }
 
+    #[inline(always)]
     fn sighting(
         &self,
         source: &Self,
@@ -261,6 +265,7 @@ impl OrganisedFrame {
     }
 
     /// Relative change of a node's depth by each coefficient.
+    #[inline(always)]
     fn field(&self, node: usize) -> [f64; COEFFICIENTS] {
         let grid = &self.grid;
         let (across, down) = (&grid.legendre[0][node % grid.cols], &grid.legendre[1][node / grid.cols]);

@@ -5,7 +5,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::preparation::frame::OrganisedFrame;
-use crate::preparation::grid::{BLOCK, Grid, NodeLens};
+use crate::preparation::grid::{Grid, NodeLens};
 use crate::preparation::node_table::NodeTable;
 
 /// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
@@ -15,9 +15,9 @@ pub(crate) trait Locate: Copy + Sync {
 
     /// Columns and rows of rays side by side.
     #[inline(always)]
-    fn nodes(&self, u: &[f32; BLOCK], v: &[f32; BLOCK]) -> [[f32; BLOCK]; 2] {
-        let mut nodes = [[0.0; BLOCK]; 2];
-        for k in 0..BLOCK {
+    fn nodes<const N: usize>(&self, u: &[f32; N], v: &[f32; N]) -> [[f32; N]; 2] {
+        let mut nodes = [[0.0; N]; 2];
+        for k in 0..N {
             [nodes[0][k], nodes[1][k]] = self.node(u[k], v[k]);
         }
         nodes
@@ -46,7 +46,7 @@ impl Locate for &NodeTable {
     }
 
     #[inline(always)]
-    fn nodes(&self, u: &[f32; BLOCK], v: &[f32; BLOCK]) -> [[f32; BLOCK]; 2] {
+    fn nodes<const N: usize>(&self, u: &[f32; N], v: &[f32; N]) -> [[f32; N]; 2] {
         self.read(u, v)
     }
 }
@@ -85,7 +85,7 @@ pub(crate) fn with_locate<W: WithLocate>(frame: &OrganisedFrame, work: W) -> W::
 }
 
 /// The node on which a point in the frame of the camera falls.
-#[inline]
+#[inline(always)]
 pub(crate) fn node_at<L: Locate>(grid: &Grid, locate: L, p: [f32; 3]) -> Option<usize> {
     let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]);
     let (col, row) = (col + 0.5, row + 0.5);

@@ -18,7 +18,8 @@ use crate::tracked::{LossReason, TrackedPose, TrackingState};
 use point_cloud::Cloud;
 use pose_graph::Relation;
 use projective_registration::{
-    ByField, FieldMatrix, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, Projection, SharedError,
+    AbsorbScratch, ByField, FieldMatrix, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, Projection,
+    SharedError,
 };
 use rigid_pose::{InputError, Uncertain};
 
@@ -42,7 +43,7 @@ pub struct Tracker {
     trajectory: Vec<TrackedPose>,
     /// What keyframes that are no more have seen.
     pub(crate) seen_before: Option<SurfaceMap>,
-    scratch: Vec<(u32, f32, f32)>,
+    scratch: AbsorbScratch,
     pub(crate) beside: Beside,
     pub(crate) spread: Spread,
 }
@@ -75,7 +76,7 @@ impl Tracker {
             last: None,
             trajectory: Vec::new(),
             seen_before: None,
-            scratch: Vec::new(),
+            scratch: AbsorbScratch::default(),
             beside: Beside::default(),
             spread: Spread::default(),
         })

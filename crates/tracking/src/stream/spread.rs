@@ -174,3 +174,43 @@ impl Tracker {
         (measured.is_sound() && fits()).then_some(relation)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::map::options::MapOptions;
+    use nalgebra::Isometry3;
+    use projective_registration::Projection;
+    use std::sync::Arc;
+
+    #[test]
+    fn a_map_made_by_parts_is_that_made_at_once() {
+        let projection = Arc::new(Projection::pinhole(160, 120, [150.0; 2], [79.5, 59.5]).unwrap());
+        let frame = |distance: f64| {
+            let points: Vec<[f64; 3]> = (0..160 * 120)
+                .map(|k| [(k % 160) as f64 - 79.5, 59.5 - (k / 160) as f64, -150.0].map(|c| c * distance / 150.0))
+                .collect();
+            OrganisedFrame::new(&projection, &points, Some(&vec![0.01; 160 * 120])).unwrap()
+        };
+        let mut spread = Spread::default();
+        for k in 0..3 {
+            let pose = Isometry3::translation(0.1 * f64::from(k), 0.0, 0.0);
+            spread.leave(frame(2.0 + 0.3 * f64::from(k)), Uncertain::exact(pose));
+        }
+        let map = || SurfaceMap::new(MapOptions::default()).unwrap();
+        let (mut at_once, mut by_parts) = (map(), map());
+        spread.bring_all_into(&mut at_once);
+        let mut frames = 0;
+        while !spread.leaving.is_empty() {
+            spread.bring_in(&mut by_parts);
+            let mut whole = by_parts.clone();
+            spread.bring_all_into(&mut whole);
+            assert_eq!(whole.cloud(), at_once.cloud(), "what waits belongs to the map");
+            frames += 1;
+        }
+        assert!(frames > 3 && !at_once.is_empty(), "{frames}");
+        assert_eq!(by_parts.cloud(), at_once.cloud());
+    }
+}

@@ -1,6 +1,8 @@
 //! A frame as a piece of a map: how well another agrees with it, what it learns from it, and what it looks like.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Without branches, all lanes are compared at once.
+#![allow(clippy::needless_bitwise_bool)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 

@@ -204,19 +204,19 @@ impl WithLocate for Sample<'_, '_> {
     fn run<L: Locate>(self, locate: L) {
         let (moved, step) = (self.moved, self.step);
         let parts = self.squares.par_chunks_mut(2 * CHUNK * BLOCK).zip(self.blocks.par_chunks(2 * CHUNK * step));
-        parts.for_each(|(squares, blocks)| run_wide(Squares { moved, blocks, step, squares }, locate));
+        parts.for_each(|(squares, blocks)| run_wide(SamplePart { moved, blocks, step, squares }, locate));
     }
 }
 
 /// The same of one part.
-struct Squares<'a, 'b> {
+struct SamplePart<'a, 'b> {
     moved: &'a Moved<'b>,
     blocks: &'a [Block],
     step: usize,
     squares: &'a mut [u32],
 }
 
-impl WithLocate for Squares<'_, '_> {
+impl WithLocate for SamplePart<'_, '_> {
     type Output = ();
 
     #[inline(always)]

@@ -210,7 +210,7 @@ impl Part<'_, '_> {
             // Blocks that follow each other in one cell are summed up in the registers.
             for (sum, lane) in run.lanes.iter_mut().zip(&lanes) {
                 let mut own = *sum;
-                for block in lane.as_chunks::<BLOCK>().0[at..at + same].iter() {
+                for block in &lane.as_chunks::<BLOCK>().0[at..at + same] {
                     for l in 0..BLOCK {
                         own[l] += block[l];
                     }

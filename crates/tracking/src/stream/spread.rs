@@ -54,8 +54,8 @@ pub(crate) struct Spread {
 
 impl Spread {
     /// A keyframe at its pose in the world that is to be brought into the map.
-    pub(crate) fn leave(&mut self, frame: OrganisedFrame, pose: Uncertain) {
-        self.leaving.push_back(Leaving { frame, pose, done: 0 });
+    pub(crate) fn leave(&mut self, frame: OrganisedFrame, pose: &Uncertain) {
+        self.leaving.push_back(Leaving { frame, pose: *pose, done: 0 });
     }
 
     /// Nothing waits for the map any more.
@@ -189,7 +189,7 @@ mod tests {
     fn a_map_made_by_parts_is_that_made_at_once() {
         let projection = Arc::new(Projection::pinhole(160, 120, [150.0; 2], [79.5, 59.5]).unwrap());
         let frame = |distance: f64| {
-            let points: Vec<[f64; 3]> = (0..160 * 120)
+            let points: Vec<[f64; 3]> = (0_usize..160 * 120)
                 .map(|k| [(k % 160) as f64 - 79.5, 59.5 - (k / 160) as f64, -150.0].map(|c| c * distance / 150.0))
                 .collect();
             OrganisedFrame::new(&projection, &points, Some(&vec![0.01; 160 * 120])).unwrap()
@@ -197,7 +197,7 @@ mod tests {
         let mut spread = Spread::default();
         for k in 0..3 {
             let pose = Isometry3::translation(0.1 * f64::from(k), 0.0, 0.0);
-            spread.leave(frame(2.0 + 0.3 * f64::from(k)), Uncertain::exact(pose));
+            spread.leave(frame(2.0 + 0.3 * f64::from(k)), &Uncertain::exact(pose));
         }
         let map = || SurfaceMap::new(MapOptions::default()).unwrap();
         let (mut at_once, mut by_parts) = (map(), map());

@@ -387,7 +387,7 @@ impl Tracker {
             let newest = self.keyframes.list.len() - 1;
             let Some((gone, keyframe, pose)) = self.keyframes.thin([last.keyframe, newest]) else { return };
             if self.seen_before.is_some() {
-                self.spread.leave(keyframe.frame, pose);
+                self.spread.leave(keyframe.frame, &pose);
             }
             last.keyframe -= usize::from(last.keyframe > gone);
         }

@@ -3,7 +3,7 @@
 //! Unknown are the poses of all keyframes but the first, which is held, and the field of the sensor's shared error, which is
 //! observed with its variances as 0 (least squares by Gauss and Newton). The poses are eliminated; what the observations
 //! scatter beyond their covariances enlarges all of them (a-posteriori variance factor). Each pose is joined with few others, so the
-//! factor is sparse: of 64 keyframes a whole one takes 20 times as long, in a frame that has to wait for it.
+//! factor is sparse: of 64 keyframes a whole one takes some 25 ms longer, in a frame that has to wait for it.
 //!
 //! The part of the field that differs from place to place is not estimated: loops would average what their neighbours
 //! share, and promise too much. It enters the covariances once, as one field of the whole path `[Schmidt1966]`.

@@ -11,7 +11,7 @@ pub use error::Error;
 pub use icp_registration;
 pub use nalgebra;
 pub use options::FrameAlignmentOptions;
-pub use partners::map::{Agreement, thumbnail_difference};
+pub use partners::map::{AbsorbScratch, Agreement, thumbnail_difference};
 pub use point_cloud;
 pub use preparation::frame::OrganisedFrame;
 pub use preparation::projection::Projection;

@@ -7,19 +7,22 @@
 //! expectation 0 and, by degree, variances that are estimated from the residuals of registrations beside their random
 //! part (quadratic and unbiased `[Rao1971]`): residuals of neighbours differ by the random part alone.
 
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+
 use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use statistics::SIGMA_OF_MAD;
 
+use crate::partners::locate::with_locate;
 use crate::partners::map::Agreement;
 use crate::partners::map::{Partner, Partners};
-use crate::partners::pairs::with_locate;
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::frame::OrganisedFrame;
+use crate::preparation::legendre::DEGREE;
+use crate::registration::products::{ROW, weighted_products};
 use icp_registration::TUKEY;
 use rigid_pose::Centred;
 
-/// Largest degree of the polynomials. Higher ones reach poses less (a tenth of the second degree on frames of a Kinect).
-const DEGREE: usize = 4;
 /// Coefficients of the field: all products of degrees up to that.
 pub const COEFFICIENTS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 /// The coefficients, metre of range or 1/metre of inverse depth: the mean square of the field over the frame is the sum
@@ -189,16 +192,19 @@ impl Influence {
     }
 }
 
+/// Where the numbers of a sighting stand: behind the derivatives by the pose those by the field, and what follows.
+const FIELD: usize = 6;
+const SCALE: usize = FIELD + COEFFICIENTS;
+const RESIDUAL: usize = SCALE + 1;
+
 /// One source node on its target plane.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sighting {
     /// In standard deviations of the nodes' noise.
     residual: f64,
     variance: f64,
-    by_pose: Vector6<f64>,
-    by_field: Field,
-    /// By the logarithm of the scale of the source's ranges.
-    by_scale: f64,
+    /// Derivatives by the pose, by the field and by the logarithm of the scale of the source's ranges, and the residual, metre; 0 in what is left.
+    row: [f64; ROW],
     /// Whether the sample before is its neighbour.
     follows: bool,
 }
@@ -230,6 +236,7 @@ impl OrganisedFrame {
         reduced(sightings, &to_tangent, scratch)
     }
 
+    #[inline(always)]
     fn sighting(
         &self,
         source: &Self,
@@ -243,50 +250,37 @@ impl OrganisedFrame {
         let point = Vector3::from(partner.point.map(f64::from));
         // Points move along their rays, and planes with them.
         let by_scale = normal.dot(&(point - source_place));
-        let of_source = source.field(partner.source as usize) * by_scale;
-        let of_target = self.field(partner.node as usize) * plane[3];
+        let (of_source, of_target) = (source.field(partner.source as usize), self.field(partner.node as usize));
         let variance = f64::from(partner.variance);
         // Planes that have learnt from other frames lie between the errors of these.
         let learnt = self.measured.get(partner.node as usize).map_or(0.0, |measured| plane[3] - f64::from(*measured));
-        Sighting {
-            residual: (f64::from(partner.residual) + learnt) / variance.sqrt(),
-            variance,
-            by_pose: frame.derivative(&point, &normal),
-            by_field: of_source - of_target,
-            by_scale,
-            follows,
+        let residual = f64::from(partner.residual) + learnt;
+        let mut row = [0.0; ROW];
+        row[..FIELD].copy_from_slice(frame.derivative(&point, &normal).as_slice());
+        for (value, (source, target)) in row[FIELD..SCALE].iter_mut().zip(of_source.iter().zip(of_target)) {
+            *value = source * by_scale - target * plane[3];
         }
+        (row[SCALE], row[RESIDUAL]) = (by_scale, residual);
+        Sighting { residual: residual / variance.sqrt(), variance, row, follows }
     }
 
     /// Relative change of a node's depth by each coefficient.
-    fn field(&self, node: usize) -> Field {
+    #[inline(always)]
+    fn field(&self, node: usize) -> [f64; COEFFICIENTS] {
         let grid = &self.grid;
-        let place = |index: usize, size: usize| (2 * index + 1) as f64 / size as f64 - 1.0;
-        let across = legendre(place(node % grid.cols, grid.cols));
-        let down = legendre(place(node / grid.cols, grid.rows));
+        let (across, down) = (&grid.legendre[0][node % grid.cols], &grid.legendre[1][node / grid.cols]);
         let [a, b, c, distance] = self.planes[node].map(f64::from);
         let inverse_depth = (a * f64::from(grid.u[node]) + b * f64::from(grid.v[node]) - c) / distance;
         let relative = if self.has_sigma { inverse_depth * f64::from(grid.cosine[node]) } else { -1.0 / inverse_depth };
-        let mut field = Field::zeros();
-        for (value, [c, r]) in field.iter_mut().zip(degrees()) {
-            *value = across[c] * down[r] * relative;
+        let (mut field, mut k) = ([0.0; COEFFICIENTS], 0);
+        for degree in 0..=DEGREE {
+            for r in 0..=degree {
+                field[k] = across[degree - r] * down[r] * relative;
+                k += 1;
+            }
         }
         field
     }
-}
-
-/// Legendre polynomials of mean square 1 over -1 to 1.
-fn legendre(x: f64) -> [f64; DEGREE + 1] {
-    let mut values = [1.0; DEGREE + 1];
-    values[1] = x;
-    for n in 1..DEGREE {
-        let k = n as f64;
-        values[n + 1] = ((2.0 * k + 1.0) * x * values[n] - k * values[n - 1]) / (k + 1.0);
-    }
-    for (n, value) in values.iter_mut().enumerate() {
-        *value *= (2.0 * n as f64 + 1.0).sqrt();
-    }
-    values
 }
 
 /// Standard deviation of values of expectation 0, from their median.
@@ -301,23 +295,19 @@ fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<
     let steps = sightings.windows(2).filter(|pair| pair[1].follows).map(|pair| pair[1].residual - pair[0].residual);
     let random = (scale(steps, scratch)? / 2.0_f64.sqrt()).max(LEAST_RANDOM);
     let reach = WIDE * TUKEY * scale(sightings.iter().map(|s| s.residual), scratch)?.max(random);
-    let (mut matrix, mut cross, mut gradient) = (Matrix6::zeros(), ByField::zeros(), Vector6::zeros());
-    let (mut normal, mut right) = (FieldMatrix::zeros(), Field::zeros());
-    let (mut scale, mut scale_right, mut scale_cross, mut scale_field) = (0.0, 0.0, Vector6::zeros(), Field::zeros());
-    for s in sightings {
+    let weighted = |s: &Sighting| {
         let u = s.residual / reach;
-        let weight = (1.0 - u * u).max(0.0).powi(2) / (s.variance * random * random);
-        let residual = s.residual * s.variance.sqrt();
-        matrix.ger(weight, &s.by_pose, &s.by_pose, 1.0);
-        cross.ger(weight, &s.by_pose, &s.by_field, 1.0);
-        normal.ger(weight, &s.by_field, &s.by_field, 1.0);
-        gradient.axpy(weight * residual, &s.by_pose, 1.0);
-        right.axpy(weight * residual, &s.by_field, 1.0);
-        scale += weight * s.by_scale * s.by_scale;
-        scale_right += weight * residual * s.by_scale;
-        scale_cross.axpy(weight * s.by_scale, &s.by_pose, 1.0);
-        scale_field.axpy(weight * s.by_scale, &s.by_field, 1.0);
-    }
+        (s.row, (1.0 - u * u).max(0.0).powi(2) / (s.variance * random * random))
+    };
+    let sums = weighted_products(sightings.iter().map(weighted));
+    let matrix = Matrix6::from_fn(|r, c| sums[r][c]);
+    let cross = ByField::from_fn(|r, c| sums[r][FIELD + c]);
+    let normal = FieldMatrix::from_fn(|r, c| sums[FIELD + r][FIELD + c]);
+    let gradient = Vector6::from_fn(|r, _| sums[r][RESIDUAL]);
+    let right = Field::from_fn(|r, _| sums[FIELD + r][RESIDUAL]);
+    let (scale, scale_right) = (sums[SCALE][SCALE], sums[SCALE][RESIDUAL]);
+    let scale_cross = Vector6::from_fn(|r, _| sums[r][SCALE]);
+    let scale_field = Field::from_fn(|r, _| sums[FIELD + r][SCALE]);
     let factor = matrix.cholesky()?;
     let pose = -factor.solve(&cross);
     let followed = factor.solve(&scale_cross);

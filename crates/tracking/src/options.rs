@@ -17,7 +17,8 @@ pub enum Relocalisation {
     Coarse,
     /// As [`Coarse`](Self::Coarse), for streams that do not wait: a lost frame is registered with two keyframes, other ones each time,
     /// and the alignment without a guess goes on beside the frames, on a thread of its own. What it finds serves the tenth frame
-    /// behind the one that was aligned, which waits for it, so that the same frames give the same bits.
+    /// behind the one that was aligned, which waits for it, so that the same frames give the same bits. Loops of a new keyframe are sought in
+    /// the frames behind it, one in each, and closed with the last of them.
     Beside,
 }
 

@@ -121,6 +121,23 @@ fn a_camera_on_its_side_is_found_beside_the_frames() {
 }
 
 #[test]
+fn loops_are_closed_beside_the_frames_as_well() {
+    let frames = || (0..312).step_by(3);
+    let truth: Vec<_> = frames().map(from_first).collect();
+    let closed = |relocalisation| {
+        let mut tracker = tracker(TrackerOptions { relocalisation, ..TrackerOptions::default() });
+        let tracked = run(&mut tracker, &seen(frames()));
+        assert!(tracked[1..].iter().all(|pose| pose.state == TrackingState::Tracked), "{relocalisation:?}");
+        let (rms, _) = absolute_error(&poses(&tracker.adjusted_trajectory()), &truth);
+        assert!(rms < 5e-3, "{relocalisation:?}: {rms}");
+        (tracker.registrations() + 1).saturating_sub(tracker.keyframes())
+    };
+    let (at_once, beside) = (closed(Relocalisation::Coarse), closed(Relocalisation::Beside));
+    // One registration a frame: those of the last keyframe may still be due.
+    assert!(at_once > 4 && beside + 4 >= at_once, "{at_once} {beside}");
+}
+
+#[test]
 fn blank_frames_are_lost_and_do_no_harm() {
     let mut tracker = tracker(TrackerOptions::default());
     let mut path = vec![None, None];

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use range_image::with_wide_registers;
 use tracking::nalgebra::Isometry3;
 use tracking::projective_registration::Projection;
 use tracking::{Relocalisation, SurfaceMap, TrackedPose, Tracker, TrackerOptions, TrackingState};
@@ -92,8 +93,14 @@ impl Pose {
         let time_s = timestamp_s + ahead_s;
         let pose = if frame.sigma.as_slice().iter().any(|sigma| *sigma > 0.0) {
             // Points without a deviation take no part, which leaves the points themselves where they are.
-            let kept = self.sigma.iter_mut().zip(frame.sigma.as_slice()).zip(frame.flags.as_slice());
-            kept.for_each(|((to, sigma), flags)| *to = if flags.is_empty() { *sigma } else { f32::NAN });
+            let kept = &mut self.sigma;
+            with_wide_registers(
+                #[inline(always)]
+                || {
+                    let pixels = kept.iter_mut().zip(frame.sigma.as_slice()).zip(frame.flags.as_slice());
+                    pixels.for_each(|((to, sigma), flags)| *to = if flags.is_empty() { *sigma } else { f32::NAN });
+                },
+            );
             self.tracker.track(time_s, &frame.points, Some(&self.sigma), None)?
         } else {
             let kept = frame.points.iter().zip(frame.flags.as_slice());

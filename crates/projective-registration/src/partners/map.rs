@@ -1,13 +1,18 @@
 //! A frame as a piece of a map: how well another agrees with it, what it learns from it, and what it looks like.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Without branches, all lanes are compared at once.
+#![allow(clippy::needless_bitwise_bool)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
+
+use std::ops::Range;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::SAME_SURFACE_COSINE;
 
-use crate::partners::pairs::{Locate, Moved, WithLocate, node_at, with_locate};
+use crate::partners::locate::{Locate, WithLocate, node_at, with_locate};
+use crate::partners::pairs::{AT_ONCE, LANES, Moved};
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::BLOCK;
 use rigid_pose::SinglePose;
@@ -92,16 +97,20 @@ impl OrganisedFrame {
     }
 
     /// Moves the planes of this frame to the weighted mean with the points of `source`, those within their noise.
-    pub fn absorb(&mut self, source: &Self, self_from_source: &Isometry3<f64>, scratch: &mut Vec<(u32, f32, f32)>) {
-        scratch.clear();
+    pub fn absorb(&mut self, source: &Self, self_from_source: &Isometry3<f64>, scratch: &mut AbsorbScratch) {
         let moved = Moved::new(source, self, self_from_source, &Vector3::zeros(), 1.0);
-        with_locate(self, Learning { moved: &moved, learned: scratch });
-        for &(node, residual, source_variance) in scratch.iter() {
-            let (plane, sigma) = (&mut self.planes[node as usize], &mut self.sigma[node as usize]);
-            let variance = *sigma * *sigma;
-            let gain = (variance / (variance + source_variance)).max(1.0 / MEMORY);
-            plane[3] += gain * residual;
-            *sigma = ((1.0 - gain) * variance).max(source_variance / MEMORY).min(variance).sqrt();
+        with_locate(self, Learning { moved: &moved, learned: &mut scratch.lanes });
+        for lanes in &scratch.lanes {
+            for k in 0..LANES {
+                let (node, source_variance) = (lanes.node[k] as usize, lanes.variance[k]);
+                let (plane, sigma) = (&mut self.planes[node], &mut self.sigma[node]);
+                let variance = *sigma * *sigma;
+                let gain = (variance / (variance + source_variance)).max(1.0 / MEMORY);
+                let learnt = ((1.0 - gain) * variance).max(source_variance / MEMORY).min(variance).sqrt();
+                // No branches: half of them would be guessed wrong at edges.
+                plane[3] += if lanes.fits[k] { gain * lanes.residual[k] } else { 0.0 };
+                *sigma = if lanes.fits[k] { learnt } else { *sigma };
+            }
         }
     }
 
@@ -143,6 +152,7 @@ impl OrganisedFrame {
     }
 
     /// The point of a node on its plane, and the plane's normal away from the camera.
+    #[inline(always)]
     fn node(&self, k: usize) -> Option<([f32; 3], [f32; 3])> {
         let ([a, b, c, distance], grid) = (self.planes[k], &self.grid);
         let (u, v) = (grid.u[k], grid.v[k]);
@@ -154,11 +164,21 @@ impl OrganisedFrame {
     /// The planes as they are now, as points on the rays of their nodes with normals towards the camera and sigma along
     /// them.
     pub fn surface(&self) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>, f64)> {
-        (0..self.grid.len()).filter_map(|k| {
+        self.surface_of(0..self.nodes())
+    }
+
+    /// The same of some nodes; none beyond [`nodes`](Self::nodes).
+    pub fn surface_of(&self, nodes: Range<usize>) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>, f64)> {
+        (nodes.start..nodes.end.min(self.nodes())).filter_map(|k| {
             let (point, normal) = self.node(k)?;
             let normal = -Vector3::from(normal.map(f64::from)).normalize();
             Some((Point3::from(point.map(f64::from)), normal, f64::from(self.sigma[k])))
         })
+    }
+
+    /// Number of nodes, with and without a plane.
+    pub fn nodes(&self) -> usize {
+        self.grid.len()
     }
 
     /// Fraction of the nodes that have a plane.
@@ -230,10 +250,24 @@ impl Partner {
     }
 }
 
-/// The planes on which nodes fall within their noise, with distance and variance of the nodes.
+/// Memory of [`OrganisedFrame::absorb`] that is used again.
+#[derive(Debug, Clone, Default)]
+pub struct AbsorbScratch {
+    lanes: Vec<Learned>,
+}
+
+/// The planes on which nodes fall, whether within their noise, with distance and variance of the nodes.
+#[derive(Debug, Clone)]
+struct Learned {
+    node: [u32; LANES],
+    residual: [f32; LANES],
+    variance: [f32; LANES],
+    fits: [bool; LANES],
+}
+
 struct Learning<'a, 'b> {
     moved: &'a Moved<'b>,
-    learned: &'a mut Vec<(u32, f32, f32)>,
+    learned: &'a mut Vec<Learned>,
 }
 
 impl WithLocate for Learning<'_, '_> {
@@ -242,19 +276,19 @@ impl WithLocate for Learning<'_, '_> {
     #[inline(always)]
     fn run<L: Locate>(self, locate: L) {
         let Self { moved, learned } = self;
-        for block in &moved.source.points.blocks {
-            let d = moved.distances(locate, block);
-            let mut fits = [false; BLOCK];
-            for k in 0..BLOCK {
+        learned.clear();
+        for blocks in moved.source.points.blocks.chunks(AT_ONCE) {
+            let d = moved.distances(locate, blocks.iter());
+            let (mut fits, mut variance) = ([false; LANES], [0.0; LANES]);
+            for (at, block) in blocks.iter().enumerate() {
+                variance[at * BLOCK..][..BLOCK].copy_from_slice(&block.variance);
+            }
+            for k in 0..LANES {
                 // NaN fails.
                 fits[k] =
-                    d.residual[k] * d.residual[k] < 9.0 * d.variance[k] && d.cosine[k] >= SAME_SURFACE_COSINE as f32;
+                    (d.residual[k] * d.residual[k] < 9.0 * d.variance[k]) & (d.cosine[k] >= SAME_SURFACE_COSINE as f32);
             }
-            for k in 0..BLOCK {
-                if fits[k] {
-                    learned.push((d.node[k], d.residual[k], block.variance[k]));
-                }
-            }
+            learned.push(Learned { node: d.node, residual: d.residual, variance, fits });
         }
     }
 }
@@ -271,6 +305,7 @@ pub(crate) struct Partners<'a, F> {
 impl<F: FnMut(Option<Partner>)> WithLocate for Partners<'_, F> {
     type Output = ();
 
+    #[inline(always)]
     fn run<L: Locate>(mut self, locate: L) {
         let pose = SinglePose::new(self.pose);
         let (cols, rows) = (self.source.grid.cols, self.source.grid.rows);
@@ -289,6 +324,7 @@ impl<F: FnMut(Option<Partner>)> WithLocate for Partners<'_, F> {
 
 impl<F> Partners<'_, F> {
     /// The plane on which a node of the source falls, its point and normal being in the target's frame.
+    #[inline(always)]
     fn partner<L: Locate>(&self, locate: L, k: usize, point: [f32; 3], normal: [f32; 3]) -> Option<Partner> {
         let node = node_at(&self.target.grid, locate, point)?;
         let plane = self.target.planes[node];

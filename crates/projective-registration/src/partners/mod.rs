@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 pub(crate) mod drawn;
+pub(crate) mod locate;
 pub(crate) mod map;
 pub(crate) mod pairs;
 pub(crate) mod shared_planes;

@@ -11,89 +11,12 @@ use icp_registration::TUKEY;
 use nalgebra::{Isometry3, Vector3};
 use point_cloud::SAME_SURFACE_COSINE;
 
+use crate::partners::locate::Locate;
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
-use crate::preparation::grid::{BLOCK, Grid};
-use crate::preparation::projection::Lens;
-use crate::preparation::table::Table;
+use crate::preparation::grid::BLOCK;
+use crate::preparation::node_table::whole;
 use rigid_pose::SinglePose;
-
-/// Above the number of nodes of any frame: from there on single precision holds whole numbers, in its low bits.
-const TWO_TO_23: f32 = 8_388_608.0;
-
-/// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
-pub(crate) trait Locate: Copy + Sync {
-    fn node(&self, u: f32, v: f32) -> [f32; 2];
-}
-
-/// A pinhole camera, in nodes.
-#[derive(Clone, Copy)]
-pub(crate) struct Pinhole {
-    focal: [f32; 2],
-    centre: [f32; 2],
-}
-
-impl Locate for Pinhole {
-    #[inline(always)]
-    fn node(&self, u: f32, v: f32) -> [f32; 2] {
-        [u * self.focal[0] + self.centre[0], self.centre[1] - v * self.focal[1]]
-    }
-}
-
-/// A table of pixels and the number of pixels a node.
-#[derive(Clone, Copy)]
-pub(crate) struct Tabled<'a> {
-    table: &'a Table,
-    scale: f32,
-    shift: f32,
-}
-
-impl Locate for Tabled<'_> {
-    #[inline(always)]
-    fn node(&self, u: f32, v: f32) -> [f32; 2] {
-        let [col, row] = self.table.read(u, v);
-        [col * self.scale + self.shift, row * self.scale + self.shift]
-    }
-}
-
-/// Something to be done with whatever camera the target has, compiled for wide registers where it is inlined.
-pub(crate) trait WithLocate {
-    type Output;
-    fn run<L: Locate>(self, locate: L) -> Self::Output;
-}
-
-/// Does work with a camera, in wide registers.
-pub(crate) fn run_wide<W: WithLocate, L: Locate>(work: W, locate: L) -> W::Output {
-    pulp::Arch::new().dispatch(Wide { work, locate })
-}
-
-struct Wide<W, L> {
-    work: W,
-    locate: L,
-}
-
-impl<W: WithLocate, L: Locate> pulp::WithSimd for Wide<W, L> {
-    type Output = W::Output;
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> W::Output {
-        self.work.run(self.locate)
-    }
-}
-
-/// Calls `work` with the camera of a frame.
-pub(crate) fn with_locate<W: WithLocate>(frame: &OrganisedFrame, work: W) -> W::Output {
-    let bin = frame.grid.bin as f64;
-    // Pixel p lies at node (p - (bin - 1) / 2) / bin.
-    let shift = -(bin - 1.0) / 2.0;
-    match frame.projection().lens() {
-        Lens::Pinhole { focal_px, centre_px } => {
-            let focal = focal_px.map(|f| (f / bin) as f32);
-            run_wide(work, Pinhole { focal, centre: centre_px.map(|c| ((c + shift) / bin) as f32) })
-        }
-        Lens::Table(table) => run_wide(work, Tabled { table, scale: (1.0 / bin) as f32, shift: (shift / bin) as f32 }),
-    }
-}
 
 /// What decides on pairs and their weights.
 #[derive(Debug, Clone, Copy, Default)]
@@ -111,16 +34,6 @@ impl Rules {
     }
 }
 
-/// The node on which a point in the frame of the camera falls.
-#[inline]
-pub(crate) fn node_at<L: Locate>(grid: &Grid, locate: L, p: [f32; 3]) -> Option<usize> {
-    let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]);
-    let (col, row) = (col + 0.5, row + 0.5);
-    // NaN fails.
-    let inside = p[2] < 0.0 && col >= 0.0 && row >= 0.0 && col < grid.cols as f32 && row < grid.rows as f32;
-    inside.then(|| row as usize * grid.cols + col as usize)
-}
-
 /// The source frame on its way to the target.
 pub(crate) struct Moved<'a> {
     pub source: &'a OrganisedFrame,
@@ -131,34 +44,64 @@ pub(crate) struct Moved<'a> {
     per_radius: f32,
 }
 
+/// Blocks that are worked on together: loops as long as all of their nodes are compiled for registers of any width, where those over one block are
+/// taken apart node by node, and put together again with as many moves as sums.
+pub(crate) const AT_ONCE: usize = 8;
+/// Their nodes.
+pub(crate) const LANES: usize = AT_ONCE * BLOCK;
+
+/// Nodes of some blocks side by side; NaN behind the last one.
+struct Lanes {
+    position: [[f32; LANES]; 3],
+    normal: [[f32; LANES]; 3],
+    variance: [f32; LANES],
+}
+
+impl Lanes {
+    #[inline(always)]
+    fn of<'b>(blocks: impl Iterator<Item = &'b Block>) -> Self {
+        let nothing = [f32::NAN; LANES];
+        let mut lanes = Self { position: [nothing; 3], normal: [nothing; 3], variance: nothing };
+        for (at, block) in blocks.take(AT_ONCE).enumerate() {
+            let at = at * BLOCK..(at + 1) * BLOCK;
+            for i in 0..3 {
+                lanes.position[i][at.clone()].copy_from_slice(&block.position[i]);
+                lanes.normal[i][at.clone()].copy_from_slice(&block.normal[i]);
+            }
+            lanes.variance[at].copy_from_slice(&block.variance);
+        }
+        lanes
+    }
+}
+
 /// Pairs side by side; all zero where a node has no partner.
 pub(crate) struct Pairs {
     /// Target normal.
-    pub normal: [[f32; BLOCK]; 3],
+    pub normal: [[f32; LANES]; 3],
     /// Rotated source normal.
-    pub source_normal: [[f32; BLOCK]; 3],
+    pub source_normal: [[f32; LANES]; 3],
     /// Moved source point from the centre, in units of the radius.
-    pub lever: [[f32; BLOCK]; 3],
+    pub lever: [[f32; LANES]; 3],
     /// Distance of the moved point from the target plane, metre.
-    pub residual: [f32; BLOCK],
+    pub residual: [f32; LANES],
     /// Variance of the residual, m².
-    pub variance: [f32; BLOCK],
+    pub variance: [f32; LANES],
     /// Weight of the robust kernel, between 0 and 1, over the variance.
-    pub weight: [f32; BLOCK],
+    pub weight: [f32; LANES],
     /// Slope of the kernel's influence over the variance.
-    pub slope: [f32; BLOCK],
+    pub slope: [f32; LANES],
 }
 
 /// Where nodes lie for the target; NaN where it has no plane.
 pub(crate) struct Distances {
     /// The target's nodes.
-    pub node: [u32; BLOCK],
+    pub node: [u32; LANES],
     /// Distance beyond the target plane, seen from the target's camera, metre.
-    pub residual: [f32; BLOCK],
+    pub residual: [f32; LANES],
     /// Variance of the residual, m².
-    pub variance: [f32; BLOCK],
+    pub variance: [f32; LANES],
     /// Cosine between the normals.
-    pub cosine: [f32; BLOCK],
+    pub cosine: [f32; LANES],
 }
 
 impl<'a> Moved<'a> {
@@ -185,16 +128,16 @@ impl<'a> Moved<'a> {
         Self { rules, ..self }
     }
 
-    /// The pairs of a block of source nodes.
+    /// The pairs of up to [`AT_ONCE`] blocks of source nodes.
     #[inline(always)]
-    pub(crate) fn pairs<L: Locate>(&self, locate: L, block: &Block) -> Pairs {
-        let (p, source_normal, planes, distances) = self.compared(locate, block);
+    pub(crate) fn pairs<'b, L: Locate>(&self, locate: L, blocks: impl Iterator<Item = &'b Block>) -> Pairs {
+        let (p, source_normal, planes, distances) = self.compared(locate, &Lanes::of(blocks));
         let (centre, per_radius, rules) = (self.centre, self.per_radius, self.rules);
         let (extra_variance, per_square_reach) = (rules.extra_variance, 1.0 / rules.reach().powi(2));
-        let nothing = [0.0; BLOCK];
-        let mut accepted = [false; BLOCK];
+        let nothing = [0.0; LANES];
+        let mut accepted = [false; LANES];
         let (mut variance, mut weight, mut slope, mut residual) = (nothing, nothing, nothing, nothing);
-        for k in 0..BLOCK {
+        for k in 0..LANES {
             variance[k] = distances.variance[k] + extra_variance;
             let information = 1.0 / variance[k];
             let u2 = distances.residual[k] * distances.residual[k] * information * per_square_reach;
@@ -208,7 +151,7 @@ impl<'a> Moved<'a> {
         }
         let mut lever = [nothing; 3];
         for i in 0..3 {
-            for k in 0..BLOCK {
+            for k in 0..LANES {
                 lever[i][k] = (p[i][k] - centre[i]) * per_radius;
             }
         }
@@ -217,10 +160,10 @@ impl<'a> Moved<'a> {
         Pairs { normal, source_normal, lever, residual, variance, weight, slope }
     }
 
-    /// Where the nodes of a block lie for the target.
+    /// Where the nodes of up to [`AT_ONCE`] blocks lie for the target.
     #[inline(always)]
-    pub(crate) fn distances<L: Locate>(&self, locate: L, block: &Block) -> Distances {
-        self.compared(locate, block).3
+    pub(crate) fn distances<'b, L: Locate>(&self, locate: L, blocks: impl Iterator<Item = &'b Block>) -> Distances {
+        self.compared(locate, &Lanes::of(blocks)).3
     }
 
     /// Moved positions and normals, the planes on which they fall, and how far off they are.
@@ -229,28 +172,28 @@ impl<'a> Moved<'a> {
     fn compared<L: Locate>(
         &self,
         locate: L,
-        block: &Block,
-    ) -> ([[f32; BLOCK]; 3], [[f32; BLOCK]; 3], [[f32; BLOCK]; 4], Distances) {
-        let p = self.rotated(&block.position, self.pose.translation);
-        let source_normal = self.rotated(&block.normal, [0.0; 3]);
+        lanes: &Lanes,
+    ) -> ([[f32; LANES]; 3], [[f32; LANES]; 3], [[f32; LANES]; 4], Distances) {
+        let p = self.rotated(&lanes.position, self.pose.translation);
+        let source_normal = self.rotated(&lanes.normal, [0.0; 3]);
         let (node, planes, variances, outside) = self.partners(locate, &p);
-        let nothing = [0.0; BLOCK];
+        let nothing = [0.0; LANES];
         let (mut residual, mut variance, mut cosine) = (nothing, nothing, nothing);
-        for k in 0..BLOCK {
+        for k in 0..LANES {
             let [a, b, c, d] = [planes[0][k], planes[1][k], planes[2][k], planes[3][k]];
             residual[k] = a * p[0][k] + b * p[1][k] + c * p[2][k] - d + outside[k];
             cosine[k] = a * source_normal[0][k] + b * source_normal[1][k] + c * source_normal[2][k];
-            variance[k] = variances[k] + block.variance[k];
+            variance[k] = variances[k] + lanes.variance[k];
         }
         (p, source_normal, planes, Distances { node, residual, variance, cosine })
     }
 
     #[inline(always)]
-    fn rotated(&self, vectors: &[[f32; BLOCK]; 3], shift: [f32; 3]) -> [[f32; BLOCK]; 3] {
-        let mut moved = [[0.0; BLOCK]; 3];
+    fn rotated(&self, vectors: &[[f32; LANES]; 3], shift: [f32; 3]) -> [[f32; LANES]; 3] {
+        let mut moved = [[0.0; LANES]; 3];
         for i in 0..3 {
             let r = self.pose.rotation[i];
-            for k in 0..BLOCK {
+            for k in 0..LANES {
                 moved[i][k] = r[0] * vectors[0][k] + r[1] * vectors[1][k] + r[2] * vectors[2][k] + shift[i];
             }
         }
@@ -264,16 +207,20 @@ impl<'a> Moved<'a> {
     fn partners<L: Locate>(
         &self,
         locate: L,
-        p: &[[f32; BLOCK]; 3],
-    ) -> ([u32; BLOCK], [[f32; BLOCK]; 4], [f32; BLOCK], [f32; BLOCK]) {
+        p: &[[f32; LANES]; 3],
+    ) -> ([u32; LANES], [[f32; LANES]; 4], [f32; LANES], [f32; LANES]) {
         let grid = &self.target.grid;
         let (cols, rows) = (grid.cols as f32, grid.rows as f32);
         let (most_col, most_row) = (cols - 0.5, rows - 0.5);
-        let (mut node, mut outside) = ([0; BLOCK], [0.0; BLOCK]);
-        for k in 0..BLOCK {
+        let (mut u, mut v) = ([0.0; LANES], [0.0; LANES]);
+        for k in 0..LANES {
             let per_depth = -1.0 / p[2][k];
-            let [col, row] = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
-            let (col, row) = (col + 0.5, row + 0.5);
+            (u[k], v[k]) = (p[0][k] * per_depth, p[1][k] * per_depth);
+        }
+        let [at_col, at_row] = locate.nodes(&u, &v);
+        let (mut node, mut outside) = ([0; LANES], [0.0; LANES]);
+        for k in 0..LANES {
+            let (col, row) = (at_col[k] + 0.5, at_row[k] + 0.5);
             // NaN fails.
             let inside = (p[2][k] < 0.0) & (col >= 0.0) & (row >= 0.0) & (col < cols) & (row < rows);
             outside[k] = if inside { 0.0 } else { f32::NAN };
@@ -281,16 +228,15 @@ impl<'a> Moved<'a> {
             let (col, row) = (if col > 0.0 { col } else { 0.0 }, if row > 0.0 { row } else { 0.0 });
             let col = if col < most_col { col } else { most_col };
             let row = if row < most_row { row } else { most_row };
-            // Whole numbers below 2²³ as the low bits of their sum with it: a cast would be done lane by lane.
-            node[k] = (row.floor() * cols + col.floor() + TWO_TO_23).to_bits() ^ TWO_TO_23.to_bits();
+            node[k] = whole(row.floor() * cols + col.floor());
         }
-        let (mut nodes, mut variances) = ([[f32::NAN; 4]; BLOCK], [f32::NAN; BLOCK]);
-        for k in 0..BLOCK {
+        let (mut nodes, mut variances) = ([[f32::NAN; 4]; LANES], [f32::NAN; LANES]);
+        for k in 0..LANES {
             nodes[k] = self.target.planes[node[k] as usize];
             variances[k] = self.target.sigma[node[k] as usize];
         }
-        let mut planes = [[0.0; BLOCK]; 4];
-        for k in 0..BLOCK {
+        let mut planes = [[0.0; LANES]; 4];
+        for k in 0..LANES {
             variances[k] *= variances[k];
             for j in 0..4 {
                 planes[j][k] = nodes[k][j];
@@ -302,10 +248,10 @@ impl<'a> Moved<'a> {
 
 /// The accepted ones of some vectors, 0 instead of the others.
 #[inline(always)]
-fn taken(vectors: &[[f32; BLOCK]; 3], accepted: &[bool; BLOCK]) -> [[f32; BLOCK]; 3] {
-    let mut taken = [[0.0; BLOCK]; 3];
+fn taken(vectors: &[[f32; LANES]; 3], accepted: &[bool; LANES]) -> [[f32; LANES]; 3] {
+    let mut taken = [[0.0; LANES]; 3];
     for i in 0..3 {
-        for k in 0..BLOCK {
+        for k in 0..LANES {
             taken[i][k] = if accepted[k] { vectors[i][k] } else { 0.0 };
         }
     }

@@ -2,8 +2,8 @@
 
 use nalgebra::Isometry3;
 
+use crate::partners::locate::with_locate;
 use crate::partners::map::{Partner, Partners};
-use crate::partners::pairs::with_locate;
 use crate::preparation::frame::OrganisedFrame;
 
 /// Cosine of the largest angle between normals of one direction: planes through few noisy nodes scatter.

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use rigid_pose::MotionEquations;
 
-use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_locate};
+use crate::partners::locate::{Locate, WithLocate, run_wide, with_locate};
+use crate::partners::pairs::{AT_ONCE, LANES, Moved, Pairs};
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::BLOCK;
@@ -87,8 +88,8 @@ impl WithLocate for Chunk<'_, '_> {
     #[inline(always)]
     fn run<L: Locate>(self, locate: L) {
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];
-        for block in self.blocks {
-            let pairs = self.moved.pairs(locate, block);
+        for blocks in self.blocks.chunks(AT_ONCE) {
+            let pairs = self.moved.pairs(locate, blocks.iter());
             add(&mut lanes, &pairs, &derivatives(&pairs.lever, &pairs.normal));
         }
         *self.sums = [0.0; SUMS];
@@ -99,56 +100,73 @@ impl WithLocate for Chunk<'_, '_> {
 /// Adds the sums of lanes to sums in double precision.
 #[inline(always)]
 pub(crate) fn hand_over<const N: usize>(sums: &mut [f64; N], lanes: &[[f32; BLOCK]; N]) {
-    for (sum, lane) in sums.iter_mut().zip(lanes) {
+    let (some, few) = lanes.as_chunks::<BLOCK>();
+    let (some_sums, few_sums) = sums.as_chunks_mut::<BLOCK>();
+    for (sums, lanes) in some_sums.iter_mut().zip(some) {
+        let mut turned = [[0.0; BLOCK]; BLOCK];
+        for l in 0..BLOCK {
+            for k in 0..BLOCK {
+                turned[l][k] = lanes[k][l];
+            }
+        }
+        for k in 0..BLOCK {
+            sums[k] += f64::from(across(&std::array::from_fn(|l| turned[l][k])));
+        }
+    }
+    for (sum, lane) in few_sums.iter_mut().zip(few) {
         *sum += f64::from(across(lane));
     }
 }
 
 /// Sum over lanes, by halves: no lane waits for the one before.
 #[inline(always)]
-pub(crate) fn across(lanes: &[f32; BLOCK]) -> f32 {
-    let mut sums = *lanes;
-    let mut half = BLOCK / 2;
-    while half > 0 {
-        for l in 0..half {
-            sums[l] += sums[l + half];
-        }
-        half /= 2;
-    }
-    sums[0]
+fn across([a, b, c, d, e, f, g, h]: &[f32; BLOCK]) -> f32 {
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
 /// Adds pairs with their derivatives.
 #[inline(always)]
-pub fn add(sums: &mut [[f32; BLOCK]; SUMS], pairs: &Pairs, row: &[[f32; BLOCK]; 6]) {
+pub fn add(sums: &mut [[f32; BLOCK]; SUMS], pairs: &Pairs, row: &[[f32; LANES]; 6]) {
     let mut k = 0;
     for r in 0..6 {
-        let mut weighted = [0.0; BLOCK];
-        for l in 0..BLOCK {
+        let mut weighted = [0.0; LANES];
+        for l in 0..LANES {
             weighted[l] = row[r][l] * pairs.weight[l];
         }
         for other in &row[r..] {
-            for l in 0..BLOCK {
-                sums[k][l] += weighted[l] * other[l];
-            }
+            add_products(&mut sums[k], &weighted, other);
             k += 1;
         }
+        add_products(&mut sums[21 + r], &weighted, &pairs.residual);
+    }
+    let (mut square, mut one, mut count) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        square[l] = pairs.residual[l] * pairs.residual[l];
+        one[l] = 1.0;
+        count[l] = if pairs.weight[l] > 0.0 { 1.0 } else { 0.0 };
+    }
+    add_products(&mut sums[27], &pairs.weight, &one);
+    add_products(&mut sums[28], &pairs.weight, &square);
+    add_products(&mut sums[29], &count, &one);
+}
+
+/// Adds products of lanes, block by block.
+#[inline(always)]
+pub(crate) fn add_products(sums: &mut [f32; BLOCK], a: &[f32; LANES], b: &[f32; LANES]) {
+    let mut own = *sums;
+    for block in 0..AT_ONCE {
         for l in 0..BLOCK {
-            sums[21 + r][l] += weighted[l] * pairs.residual[l];
+            own[l] += a[block * BLOCK + l] * b[block * BLOCK + l];
         }
     }
-    for l in 0..BLOCK {
-        sums[27][l] += pairs.weight[l];
-        sums[28][l] += pairs.weight[l] * pairs.residual[l] * pairs.residual[l];
-        sums[29][l] += if pairs.weight[l] > 0.0 { 1.0 } else { 0.0 };
-    }
+    *sums = own;
 }
 
 /// Derivatives of the distance along `normal` by `[dt, rho w]`: the normal and lever x normal.
 #[inline(always)]
-pub(crate) fn derivatives(lever: &[[f32; BLOCK]; 3], normal: &[[f32; BLOCK]; 3]) -> [[f32; BLOCK]; 6] {
-    let mut rows = [normal[0], normal[1], normal[2], [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]];
-    for l in 0..BLOCK {
+pub(crate) fn derivatives(lever: &[[f32; LANES]; 3], normal: &[[f32; LANES]; 3]) -> [[f32; LANES]; 6] {
+    let mut rows = [normal[0], normal[1], normal[2], [0.0; LANES], [0.0; LANES], [0.0; LANES]];
+    for l in 0..LANES {
         let (q, n) = ([lever[0][l], lever[1][l], lever[2][l]], [normal[0][l], normal[1][l], normal[2][l]]);
         rows[3][l] = q[1] * n[2] - q[2] * n[1];
         rows[4][l] = q[2] * n[0] - q[0] * n[2];
@@ -186,36 +204,32 @@ impl WithLocate for Sample<'_, '_> {
     fn run<L: Locate>(self, locate: L) {
         let (moved, step) = (self.moved, self.step);
         let parts = self.squares.par_chunks_mut(2 * CHUNK * BLOCK).zip(self.blocks.par_chunks(2 * CHUNK * step));
-        parts.for_each(|(squares, blocks)| {
-            let mut places = squares.chunks_exact_mut(BLOCK);
-            let work = |pairs: &Pairs| {
-                let place = places.next().unwrap_or_default();
-                for (k, square) in place.iter_mut().enumerate() {
-                    if pairs.weight[k] > 0.0 {
-                        *square = positive_bits(pairs.residual[k] * pairs.residual[k] / pairs.variance[k]);
-                    }
-                }
-            };
-            run_wide(Visit { moved, blocks, step, work }, locate);
-        });
+        parts.for_each(|(squares, blocks)| run_wide(SamplePart { moved, blocks, step, squares }, locate));
     }
 }
 
-/// Calls a function with the pairs of every `step`-th block.
-struct Visit<'a, 'b, F> {
+/// The same of one part.
+struct SamplePart<'a, 'b> {
     moved: &'a Moved<'b>,
     blocks: &'a [Block],
     step: usize,
-    work: F,
+    squares: &'a mut [u32],
 }
 
-impl<F: FnMut(&Pairs)> WithLocate for Visit<'_, '_, F> {
+impl WithLocate for SamplePart<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Locate>(mut self, locate: L) {
-        for block in self.blocks.iter().step_by(self.step) {
-            (self.work)(&self.moved.pairs(locate, block));
+    fn run<L: Locate>(self, locate: L) {
+        let together = self.blocks.chunks(AT_ONCE * self.step).zip(self.squares.chunks_mut(LANES));
+        for (blocks, squares) in together {
+            let pairs = self.moved.pairs(locate, blocks.iter().step_by(self.step));
+            let mut bits = [NO_PAIR; LANES];
+            for k in 0..LANES {
+                let square = positive_bits(pairs.residual[k] * pairs.residual[k] / pairs.variance[k]);
+                bits[k] = if pairs.weight[k] > 0.0 { square } else { NO_PAIR };
+            }
+            squares.copy_from_slice(&bits[..squares.len()]);
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::preparation::legendre::{DEGREE, legendre_along};
+use crate::preparation::node_table::NodeTable;
 use crate::preparation::projection::Lens;
 
 /// Number of nodes that large frames are reduced to. Averages of squares carry what their pixels say about the pose
@@ -23,6 +25,14 @@ pub(crate) const MOST_CELLS: usize = CELLS * CELLS;
 /// Stands for no node where a level does not fill its last block.
 pub(crate) const NO_NODE: u32 = u32::MAX;
 
+/// The part of a grid that turns directions into nodes.
+#[derive(Debug)]
+pub(crate) enum NodeLens {
+    /// Focal lengths and principal point in nodes.
+    Pinhole([f32; 2], [f32; 2]),
+    Table(NodeTable),
+}
+
 /// Nodes of a frame, row by row, with their rays (x, y, -1) in the camera frame.
 #[derive(Debug)]
 pub(crate) struct Grid {
@@ -30,12 +40,16 @@ pub(crate) struct Grid {
     pub bin: usize,
     pub cols: usize,
     pub rows: usize,
+    /// On which node a ray falls.
+    pub lens: NodeLens,
     /// x/depth of the rays.
     pub u: Vec<f32>,
     /// y/depth of the rays.
     pub v: Vec<f32>,
     /// Cosine between the rays and the optical axis.
     pub cosine: Vec<f32>,
+    /// Legendre polynomials at the columns and at the rows of nodes.
+    pub legendre: [Vec<[f64; DEGREE + 1]>; 2],
     /// Turns the gradient of a function along columns and rows of nodes into that along u and v:
     /// `du = m[0] dc + m[1] dr`, `dv = m[2] dc + m[3] dr`.
     pub gradient: Vec<[f32; 4]>,
@@ -72,6 +86,15 @@ impl Grid {
             sum.map(|s| s / (bin * bin) as f64)
         };
         let rays: Vec<[f64; 2]> = (0..cols * rows).map(|k| mean_ray(k % cols, k / cols)).collect();
+        let of_nodes = match lens {
+            Lens::Pinhole { focal_px, centre_px } => {
+                let size = bin as f64;
+                // Pixel p lies at node (p - (bin - 1) / 2) / bin.
+                let centre = centre_px.map(|c| ((c - (size - 1.0) / 2.0) / size) as f32);
+                NodeLens::Pinhole(focal_px.map(|f| (f / size) as f32), centre)
+            }
+            Lens::Table(_) => NodeLens::Table(NodeTable::new(cols, rows, &rays)),
+        };
         let gradient = (0..cols * rows).map(|k| gradient(&rays, cols, rows, k, lens, bin)).collect();
         let tiles = Tiles::new(cols, rows);
         let (order, levels) = by_levels(cols, rows, &tiles);
@@ -82,11 +105,13 @@ impl Grid {
             bin,
             cols,
             rows,
+            lens: of_nodes,
             order,
             levels,
             u: rays.iter().map(|r| r[0] as f32).collect(),
             v: rays.iter().map(|r| r[1] as f32).collect(),
             cosine: rays.iter().map(|r| (1.0 / (1.0 + r[0] * r[0] + r[1] * r[1]).sqrt()) as f32).collect(),
+            legendre: [cols, rows].map(legendre_along),
             gradient,
         }
     }

@@ -4,6 +4,8 @@ pub(crate) mod bits;
 pub(crate) mod blocks;
 pub(crate) mod frame;
 pub(crate) mod grid;
+pub(crate) mod legendre;
+pub(crate) mod node_table;
 pub(crate) mod nodes;
 pub(crate) mod planes;
 pub(crate) mod projection;

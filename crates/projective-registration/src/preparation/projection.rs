@@ -112,10 +112,6 @@ impl Projection {
         let inside = |x: f64, size: usize| (-0.5..size as f64 - 0.5).contains(&x);
         (inside(col, self.width) && inside(row, self.height)).then_some([col, row])
     }
-
-    pub(crate) fn lens(&self) -> &Lens {
-        &self.lens
-    }
 }
 
 fn check_size(width: usize, height: usize) -> Result<()> {

@@ -4,33 +4,40 @@ use crate::error::{Error, Result};
 
 /// Newton steps within one quadrangle of four rays: its mapping is almost linear.
 const STEPS: usize = 4;
-/// How far outside its quadrangle an entry is still filled, in pixels: bilinear reading needs neighbours at the rim.
+/// How far outside its quadrangle an entry is still filled, in entries: bilinear reading needs neighbours at the rim.
 const MARGIN: f64 = 2.0;
 
 /// Pixels over a regular grid in u = x/depth, v = y/depth.
 #[derive(Debug)]
 pub(crate) struct Table {
-    origin: [f64; 2],
+    pub(super) origin: [f64; 2],
     /// Entries per unit of u and v.
-    density: [f64; 2],
-    cols: usize,
-    rows: usize,
+    pub(super) density: [f64; 2],
+    pub(super) cols: usize,
+    pub(super) rows: usize,
     /// Pixel (col, row) of each entry; NaN where no ray leads.
-    pixels: Vec<[f32; 2]>,
+    pub(super) pixels: Vec<[f32; 2]>,
+    /// Pixels from entry to entry.
+    spacing: f64,
 }
 
 impl Table {
     /// `rays`: (u, v) of each pixel, row by row.
     pub(crate) fn new(width: usize, height: usize, rays: &[[f64; 2]]) -> Result<Self> {
         check_spread(width, height, rays)?;
+        Ok(Self::of_every(1.0, width, height, rays))
+    }
+
+    /// With an entry for every so many pixels along each side, of rays that neither coincide nor cross.
+    pub(super) fn of_every(spacing: f64, width: usize, height: usize, rays: &[[f64; 2]]) -> Self {
         let bound = |i: usize, best: fn(f64, f64) -> f64| rays.iter().map(|r| r[i]).fold(f64::NAN, best);
         let low = [bound(0, f64::min), bound(1, f64::min)];
         let high = [bound(0, f64::max), bound(1, f64::max)];
-        // One entry a pixel along each side, and a rim of two for reading at the border.
-        let density = [0, 1].map(|i| [width, height][i] as f64 / (high[i] - low[i]));
+        // A rim of two for reading at the border.
+        let density = [0, 1].map(|i| [width, height][i] as f64 / (spacing * (high[i] - low[i])));
         let origin = [0, 1].map(|i| low[i] - 2.0 / density[i]);
-        let (cols, rows) = (width + 5, height + 5);
-        let mut table = Self { origin, density, cols, rows, pixels: vec![[f32::NAN; 2]; cols * rows] };
+        let [cols, rows] = [width, height].map(|size| (size as f64 / spacing).ceil() as usize + 5);
+        let mut table = Self { origin, density, cols, rows, pixels: vec![[f32::NAN; 2]; cols * rows], spacing };
         let mut distances = vec![f64::INFINITY; cols * rows];
         for row in 0..height - 1 {
             for col in 0..width - 1 {
@@ -39,7 +46,7 @@ impl Table {
                 table.fill(corners, [col as f64, row as f64], &mut distances);
             }
         }
-        Ok(table)
+        table
     }
 
     /// Fills the entries in and near one quadrangle of rays whose first pixel is `first`. Of several quadrangles that
@@ -58,7 +65,7 @@ impl Table {
                 let Some([a, b]) = inverse_bilinear(corners, at) else { continue };
                 let distance = (-a).max(a - 1.0).max(-b).max(b - 1.0).max(0.0);
                 let k = r * self.cols + c;
-                if distance < distances[k] && distance <= MARGIN {
+                if distance < distances[k] && distance <= MARGIN * self.spacing {
                     distances[k] = distance;
                     self.pixels[k] = [(first[0] + a) as f32, (first[1] + b) as f32];
                 }

@@ -11,11 +11,12 @@ use std::ops::Add;
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::partners::pairs::{Locate, Moved, WithLocate, with_locate};
+use crate::partners::locate::{Locate, WithLocate, with_locate};
+use crate::partners::pairs::{AT_ONCE, LANES, Moved};
 use crate::partners::track::Frames;
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
-use crate::preparation::grid::{BLOCK, STRIDES};
+use crate::preparation::grid::STRIDES;
 use crate::preparation::planes::HALF;
 
 /// Distance from a plane within which nodes agree with it, in units of the frames' radius.
@@ -152,10 +153,10 @@ impl WithLocate for Compare<'_, '_> {
     #[inline(always)]
     fn run<L: Locate>(self, locate: L) {
         // Agreeing, contradicting, hidden, unclear.
-        let mut sums = [[0_u32; BLOCK]; 4];
-        for block in self.blocks {
-            let distances = self.moved.distances(locate, block);
-            for k in 0..BLOCK {
+        let mut sums = [[0_u32; LANES]; 4];
+        for blocks in self.blocks.chunks(AT_ONCE) {
+            let distances = self.moved.distances(locate, blocks.iter());
+            for k in 0..LANES {
                 let (residual, cosine) = (distances.residual[k], distances.cosine[k]);
                 let tolerance = self.tolerance + SIGMAS * distances.variance[k].sqrt();
                 // Normals lead away from the cameras: what lies in front of a plane is below it. NaN fails everywhere.

@@ -5,6 +5,7 @@ pub(crate) mod apart;
 pub(crate) mod consistency;
 pub(crate) mod outlines;
 pub(crate) mod places;
+pub(crate) mod products;
 pub(crate) mod quality;
 pub(crate) mod search;
 pub(crate) mod settling;

@@ -4,8 +4,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
+use crate::partners::locate::{Locate, WithLocate, node_at, with_locate};
 use crate::partners::map::AGREEING_SIGMA;
-use crate::partners::pairs::{Locate, WithLocate, node_at, with_locate};
 use crate::partners::track::{Frames, Track};
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::aligner::FrameAligner;

@@ -14,7 +14,8 @@ use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::partners::pairs::{Locate, Moved, Pairs, WithLocate, run_wide, with_locate};
+use crate::partners::locate::{Locate, WithLocate, run_wide, with_locate};
+use crate::partners::pairs::{AT_ONCE, LANES, Moved, Pairs};
 use crate::partners::sums::{self, Normal, derivatives};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};
@@ -162,9 +163,9 @@ impl WithLocate for Part<'_, '_> {
         let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS] };
         for (blocks, cells) in self.blocks.chunks(sums::CHUNK).zip(self.cell_of.chunks(sums::CHUNK)) {
             let mut totals = [[0.0; BLOCK]; sums::SUMS];
-            for (block, cell_of) in blocks.iter().zip(cells) {
-                let pairs = self.moved.pairs(locate, block);
-                self.add(&mut run, &mut totals, &pairs, cell_of);
+            for (blocks, cells) in blocks.chunks(AT_ONCE).zip(cells.chunks(AT_ONCE)) {
+                let pairs = self.moved.pairs(locate, blocks.iter());
+                self.add(&mut run, &mut totals, &pairs, cells);
             }
             sums::hand_over(self.totals, &totals);
         }
@@ -180,49 +181,66 @@ struct Run {
 
 impl Part<'_, '_> {
     #[inline(always)]
-    fn add(&mut self, run: &mut Run, totals: &mut [[f32; BLOCK]; sums::SUMS], pairs: &Pairs, cell_of: &[u16; BLOCK]) {
+    fn add(&mut self, run: &mut Run, totals: &mut [[f32; BLOCK]; sums::SUMS], pairs: &Pairs, cells: &[[u16; BLOCK]]) {
         let along_target = derivatives(&pairs.lever, &pairs.normal);
         let along_source = derivatives(&pairs.lever, &pairs.source_normal);
-        let mut lanes = [[0.0_f32; BLOCK]; SUMS];
-        let (mut score, mut half_slope) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
-        for l in 0..BLOCK {
+        sums::add(totals, pairs, &along_target);
+        let mut lanes = [[0.0_f32; LANES]; SUMS];
+        let (mut score, mut half_slope) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        for l in 0..LANES {
             score[l] = pairs.weight[l] * pairs.residual[l];
             half_slope[l] = 0.5 * pairs.slope[l];
         }
         let mut k = 0;
         for r in 0..6 {
-            for l in 0..BLOCK {
+            for l in 0..LANES {
                 lanes[r][l] = along_target[r][l] * score[l];
             }
             for c in r..6 {
-                for l in 0..BLOCK {
+                for l in 0..LANES {
                     let cross = along_target[r][l] * along_source[c][l] + along_target[c][l] * along_source[r][l];
                     lanes[6 + k][l] = half_slope[l] * cross;
                 }
                 k += 1;
             }
         }
-        sums::add(totals, pairs, &along_target);
-        self.sort(run, &lanes, cell_of, &pairs.weight);
+        let mut at = 0;
+        while at < cells.len() {
+            let same = cells[at..].iter().take_while(|cell_of| cell_of.iter().all(|cell| *cell == run.cell)).count();
+            // Blocks that follow each other in one cell are summed up in the registers.
+            for (sum, lane) in run.lanes.iter_mut().zip(&lanes) {
+                let mut own = *sum;
+                for block in &lane.as_chunks::<BLOCK>().0[at..at + same] {
+                    for l in 0..BLOCK {
+                        own[l] += block[l];
+                    }
+                }
+                *sum = own;
+            }
+            at += same;
+            if at < cells.len() {
+                self.sort(run, &lanes, at * BLOCK, &cells[at], &pairs.weight);
+                at += 1;
+            }
+        }
     }
 
-    /// Adds each lane to its cell.
+    /// Adds the lanes of a block that lies in several cells or begins another one, from `first` on, each to its cell.
     #[inline(always)]
-    fn sort(&mut self, run: &mut Run, lanes: &[[f32; BLOCK]; SUMS], cell_of: &[u16; BLOCK], weight: &[f32; BLOCK]) {
-        if cell_of.iter().all(|cell| *cell == run.cell) {
-            for (sum, lane) in run.lanes.iter_mut().zip(lanes) {
-                for l in 0..BLOCK {
-                    sum[l] += lane[l];
-                }
-            }
-            return;
-        }
+    fn sort(
+        &mut self,
+        run: &mut Run,
+        lanes: &[[f32; LANES]; SUMS],
+        first: usize,
+        cell_of: &[u16; BLOCK],
+        weight: &[f32; LANES],
+    ) {
         let mut waiting = [false; BLOCK];
         for l in 0..BLOCK {
-            waiting[l] = weight[l] > 0.0;
+            waiting[l] = weight[first + l] > 0.0;
         }
-        while let Some(first) = waiting.iter().position(|w| *w) {
-            let cell = cell_of[first];
+        while let Some(next) = waiting.iter().position(|w| *w) {
+            let cell = cell_of[next];
             if cell != run.cell {
                 self.end(run);
                 run.cell = cell;
@@ -234,7 +252,7 @@ impl Part<'_, '_> {
             }
             for (sum, lane) in run.lanes.iter_mut().zip(lanes) {
                 for l in 0..BLOCK {
-                    sum[l] += share[l] * lane[l];
+                    sum[l] += share[l] * lane[first + l];
                 }
             }
         }

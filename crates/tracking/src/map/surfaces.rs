@@ -1,6 +1,7 @@
 //! The map: points in voxels, each surface of a voxel one of them.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use point_cloud::Cloud;
@@ -87,10 +88,10 @@ impl SurfaceMap {
         }
     }
 
-    /// Adds the surfaces of a frame at its pose.
-    pub(crate) fn add_frame(&mut self, frame: &OrganisedFrame, world_from_camera: &Uncertain) {
+    /// Adds the surfaces of some nodes of a frame at its pose.
+    pub(crate) fn add_nodes(&mut self, frame: &OrganisedFrame, world_from_camera: &Uncertain, nodes: Range<usize>) {
         let Uncertain { pose, covariance } = world_from_camera;
-        for (point, normal, noise_m) in frame.surface() {
+        for (point, normal, noise_m) in frame.surface_of(nodes) {
             let pose_m = pose_sigma(pose, covariance, &point, &normal);
             self.add(pose * point, pose * normal, noise_m, pose_m);
         }

@@ -105,13 +105,18 @@ impl Keyframes {
             };
             others.map(distance).fold(f64::INFINITY, f64::min)
         };
-        let free = (1..self.list.len()).filter(|k| !spared.contains(k));
-        let k = free.min_by(|x, y| gap(*x).total_cmp(&gap(*y)))?;
+        let free = (1..self.list.len()).filter(|k| !spared.contains(k)).map(|k| (gap(k), k));
+        let (_, k) = free.min_by(|x, y| x.0.total_cmp(&y.0))?;
         let pose = self.pose(k);
         let (hub, k_from_hub) = self.graph.remove(k)?;
         let joined = Anchor::Joined { to: self.list[hub].number, to_from_this: k_from_hub.pose().inverse() };
         self.anchors[self.list[k].number] = joined;
         Some((k, self.list.remove(k), pose))
+    }
+
+    /// Where a keyframe of this number stands in the list, if it is kept.
+    pub(crate) fn index(&self, number: usize) -> Option<usize> {
+        self.list.iter().position(|keyframe| keyframe.number == number)
     }
 
     /// Pose of a keyframe in the world.
@@ -139,7 +144,7 @@ impl Keyframes {
         for _ in 0..=self.anchors.len() {
             match self.anchors.get(number)? {
                 Anchor::Kept => {
-                    let k = self.list.iter().position(|k| k.number == number)?;
+                    let k = self.index(number)?;
                     return Some(self.graph.poses[k].pose() * chain);
                 }
                 Anchor::Joined { to, to_from_this } => {

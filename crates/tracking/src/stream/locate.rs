@@ -256,7 +256,7 @@ impl Tracker {
 }
 
 /// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.
-fn register(
+pub(crate) fn register(
     aligner: &mut FrameAligner,
     source: &OrganisedFrame,
     target: &OrganisedFrame,

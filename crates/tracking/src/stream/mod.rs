@@ -5,5 +5,6 @@ pub(crate) mod keyframes;
 pub(crate) mod locate;
 pub(crate) mod reference;
 pub(crate) mod returns;
+pub(crate) mod spread;
 pub(crate) mod tracker;
 pub(crate) mod wide;

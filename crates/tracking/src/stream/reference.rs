@@ -42,7 +42,7 @@ impl Tracker {
     }
 
     /// Adjusts the keyframes where a loop has been closed.
-    fn adjust(&mut self) {
+    pub(crate) fn adjust(&mut self) {
         let change = self.keyframes.graph.adjust_if_closed();
         if let Some(last) = &mut self.last {
             last.own.pose = step_pose(&last.own.pose, &(last.by_field * change));

@@ -3,7 +3,6 @@
 use nalgebra::Isometry3;
 
 use crate::stream::tracker::Tracker;
-use pose_graph::Edge;
 use projective_registration::Agreement;
 
 impl Tracker {
@@ -16,21 +15,9 @@ impl Tracker {
         let joined: Vec<bool> = (0..=new).map(|k| k == new || self.keyframes.graph.joined(k, new)).collect();
         let others = |k: usize| !joined[k];
         let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others);
-        let mut closing = Vec::new();
-        for (overlap, k) in candidates.into_iter().take(self.options.loop_attempts) {
-            if overlap < Agreement::LEAST_OVERLAP {
-                break;
-            }
-            let guess = self.keyframes.graph.relative(k, new);
-            if let Ok(measured) = self.try_keyframe(k, &guess) {
-                let edge = Edge { a: k, b: new, a_from_b: measured.relation(), alike: 1.0 };
-                if measured.is_sound() && self.keyframes.graph.fits(&edge) {
-                    closing.push(edge);
-                }
-            }
-        }
-        // Half of the errors are the frame's, which all have in common: n with the variance (1 + 1/n)/2 of their mean.
-        let alike = (closing.len() as f64).midpoint(1.0);
-        self.keyframes.graph.take(closing.into_iter().map(|edge| Edge { alike, ..edge }));
+        let few = candidates.into_iter().take(self.options.loop_attempts);
+        let seen: Vec<usize> =
+            few.filter(|(overlap, _)| *overlap >= Agreement::LEAST_OVERLAP).map(|(_, k)| k).collect();
+        self.seek_loops(new, seen.into_iter());
     }
 }

@@ -13,11 +13,13 @@ use crate::options::TrackerOptions;
 use crate::stream::beside::Beside;
 use crate::stream::keyframes::Keyframes;
 use crate::stream::locate::{Fix, Measured};
+use crate::stream::spread::Spread;
 use crate::tracked::{LossReason, TrackedPose, TrackingState};
 use point_cloud::Cloud;
 use pose_graph::Relation;
 use projective_registration::{
-    ByField, FieldMatrix, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, Projection, SharedError,
+    AbsorbScratch, ByField, FieldMatrix, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, Projection,
+    SharedError,
 };
 use rigid_pose::{InputError, Uncertain};
 
@@ -40,9 +42,10 @@ pub struct Tracker {
     pub(crate) last: Option<Last>,
     trajectory: Vec<TrackedPose>,
     /// What keyframes that are no more have seen.
-    seen_before: Option<SurfaceMap>,
-    scratch: Vec<(u32, f32, f32)>,
+    pub(crate) seen_before: Option<SurfaceMap>,
+    scratch: AbsorbScratch,
     pub(crate) beside: Beside,
+    pub(crate) spread: Spread,
 }
 
 /// All that one frame gave.
@@ -73,8 +76,9 @@ impl Tracker {
             last: None,
             trajectory: Vec::new(),
             seen_before: None,
-            scratch: Vec::new(),
+            scratch: AbsorbScratch::default(),
             beside: Beside::default(),
+            spread: Spread::default(),
         })
     }
 
@@ -111,7 +115,7 @@ impl Tracker {
             None => self.start(timestamp_s),
             Some(last) => self.follow(timestamp_s, &last, prior),
         };
-        std::mem::swap(&mut self.current, &mut self.previous);
+        self.go_on();
         self.trajectory.push(pose);
         Ok(pose)
     }
@@ -155,14 +159,16 @@ impl Tracker {
     /// others already.
     pub fn keep_map(&mut self, map: SurfaceMap) {
         self.seen_before = Some(map);
+        self.spread.forget_leaving();
     }
 
     /// The map with each surface once: what [`keep_map`](Self::keep_map) holds, and the surfaces of all keyframes where they lie now.
     /// `None` without `keep_map`.
     pub fn surface_map(&self) -> Option<SurfaceMap> {
         let mut map = self.seen_before.clone()?;
+        self.spread.bring_all_into(&mut map);
         for (k, keyframe) in self.keyframes.list.iter().enumerate() {
-            map.add_frame(&keyframe.frame, &self.keyframes.pose(k));
+            map.add_nodes(&keyframe.frame, &self.keyframes.pose(k), 0..keyframe.frame.nodes());
         }
         Some(map)
     }
@@ -380,8 +386,8 @@ impl Tracker {
         while self.keyframes.list.len() > self.options.max_keyframes {
             let newest = self.keyframes.list.len() - 1;
             let Some((gone, keyframe, pose)) = self.keyframes.thin([last.keyframe, newest]) else { return };
-            if let Some(map) = &mut self.seen_before {
-                map.add_frame(&keyframe.frame, &pose);
+            if self.seen_before.is_some() {
+                self.spread.leave(keyframe.frame, &pose);
             }
             last.keyframe -= usize::from(last.keyframe > gone);
         }

@@ -37,9 +37,6 @@ pub(crate) struct Attaching<'a> {
     pub before: &'a mut [f32],
     pub wraps: &'a mut [i32],
     pub confidence: &'a mut [f32],
-    /// How often in a row each pixel was contradicted: with its count, a pixel takes over what speaks against it, so that a
-    /// surface that moves through the image cannot escape.
-    pub doubts: &'a mut [u8],
     pub noise2: f32,
     pub maximum_wraps: i32,
 }
@@ -83,8 +80,8 @@ impl Attaching<'_> {
     }
 
     /// The other sweeps, and the setting aside: pixels attached at edges have a count for this frame only. Gives the number of those
-    /// that were attached, and of those at edges; lists those that are left.
-    pub fn grow(&mut self, blocks: &mut [Block], open: &mut Vec<u32>) -> [usize; 2] {
+    /// that were attached, of those at edges, and of their neighbours that continue them with another count; lists those that are left.
+    pub fn grow(&mut self, blocks: &mut [Block], open: &mut Vec<u32>) -> [usize; 3] {
         let left = |blocks: &[Block]| blocks.iter().map(|block| block.open.count_ones()).sum::<u32>();
         let mut before = left(blocks);
         for sweep in 1..SWEEPS {
@@ -99,12 +96,13 @@ impl Attaching<'_> {
             }
             before = now;
         }
-        let mut counts = [0; 2];
+        let mut counts = [0; 3];
         with_wide_registers(
             #[inline(always)]
             || {
                 for block in blocks.iter() {
-                    let at_edge = if block.attached == 0 { 0 } else { self.set_aside(block) };
+                    let [at_edge, contested] = if block.attached == 0 { [0; 2] } else { self.set_aside(block) };
+                    counts[2] += contested as usize;
                     counts[1] += at_edge.count_ones() as usize;
                     counts[0] += block.attached.count_ones() as usize;
                 }
@@ -178,7 +176,6 @@ impl Attaching<'_> {
         }
         self.wraps[pixel] = wraps;
         self.confidence[pixel] = self.confidence[other];
-        self.doubts[pixel] = self.doubts[other];
         self.unwrapped[pixel] = own + TAU * wraps as f32;
         self.before[pixel] = self.amplitude[pixel];
         self.state[pixel] = HELD;
@@ -187,13 +184,14 @@ impl Attaching<'_> {
     }
 
     /// A pixel with a neighbour on another surface may belong to that one, or to neither, as slivers and mixed pixels do: it has
-    /// its count for this frame, and says that it is a guess. Gives those of the attached ones of a block that do, a bit each.
+    /// its count for this frame, and says that it is a guess. Gives those of the attached ones of a block that do, a bit each, and how
+    /// many neighbours look like the same surface but have another count.
     #[inline(always)]
-    fn set_aside(&mut self, block: &Block) -> u32 {
+    fn set_aside(&mut self, block: &Block) -> [u32; 2] {
         let first = block.first as usize;
         let (phase, brightness, wraps) =
             (here(self.phase, first), here(self.amplitude, first), here(self.wraps, first));
-        let mut edges = [0_u32; LANES];
+        let (mut edges, mut contested) = (0, 0);
         for (number, side) in self.sides(block).into_iter().enumerate() {
             let Some(side) = side else { continue };
             let (other, amplitude, counts) =
@@ -204,15 +202,25 @@ impl Attaching<'_> {
                 (2, _, Some(last)) => state[last] = MASKED,
                 _ => {}
             }
+            let (mut open, mut far) = ([0_u32; LANES], [0_u32; LANES]);
             for i in 0..LANES {
                 let unwrapped = [phase[i] + TAU * wraps[i] as f32, other[i] + TAU * counts[i] as f32];
                 let apart = apart(unwrapped, [brightness[i], amplitude[i]], self.noise2);
                 let state = u32::from(state[i]);
                 let known = (state == u32::from(HELD)) | (state == u32::from(RIM));
-                edges[i] |= u32::from((state == u32::from(OPEN)) | (known & apart));
+                open[i] = u32::from(state == u32::from(OPEN)) << i;
+                far[i] = u32::from(known & apart) << i;
+            }
+            let mut far = far.iter().fold(0, |all, one| all | one) & block.attached;
+            edges |= far | open.iter().fold(0, |all, one| all | one);
+            while far != 0 {
+                let i = far.trailing_zeros() as usize % LANES;
+                far &= far - 1;
+                let step = wrapped(phase[i] - other[i]).abs();
+                contested += u32::from(is_gentle(step, [brightness[i], amplitude[i]], self.noise2));
             }
         }
-        let at_edge = edges.iter().enumerate().fold(0, |bits, (i, edge)| bits | edge << i) & block.attached;
+        let at_edge = edges & block.attached;
         let mut left = at_edge;
         while left != 0 {
             let pixel = first + left.trailing_zeros() as usize;
@@ -221,7 +229,7 @@ impl Attaching<'_> {
             self.unwrapped[pixel] = f32::NAN;
             self.confidence[pixel] = 0.0;
         }
-        at_edge
+        [at_edge, contested]
     }
 
     /// Where the blocks above, to the left, to the right and below begin, as far as there is one.

@@ -191,7 +191,7 @@ impl Attaching<'_> {
         let first = block.first as usize;
         let (phase, brightness, wraps) =
             (here(self.phase, first), here(self.amplitude, first), here(self.wraps, first));
-        let (mut edges, mut contested) = (0, 0);
+        let mut edges = [0_u32; LANES];
         for (number, side) in self.sides(block).into_iter().enumerate() {
             let Some(side) = side else { continue };
             let (other, amplitude, counts) =
@@ -202,34 +202,40 @@ impl Attaching<'_> {
                 (2, _, Some(last)) => state[last] = MASKED,
                 _ => {}
             }
-            let (mut open, mut far) = ([0_u32; LANES], [0_u32; LANES]);
             for i in 0..LANES {
                 let unwrapped = [phase[i] + TAU * wraps[i] as f32, other[i] + TAU * counts[i] as f32];
                 let apart = apart(unwrapped, [brightness[i], amplitude[i]], self.noise2);
                 let state = u32::from(state[i]);
                 let known = (state == u32::from(HELD)) | (state == u32::from(RIM));
-                open[i] = u32::from(state == u32::from(OPEN)) << i;
-                far[i] = u32::from(known & apart) << i;
-            }
-            let mut far = far.iter().fold(0, |all, one| all | one) & block.attached;
-            edges |= far | open.iter().fold(0, |all, one| all | one);
-            while far != 0 {
-                let i = far.trailing_zeros() as usize % LANES;
-                far &= far - 1;
-                let step = wrapped(phase[i] - other[i]).abs();
-                contested += u32::from(is_gentle(step, [brightness[i], amplitude[i]], self.noise2));
+                edges[i] |= u32::from((state == u32::from(OPEN)) | (known & apart));
             }
         }
-        let at_edge = edges & block.attached;
+        let at_edge = edges.iter().enumerate().fold(0, |bits, (i, edge)| bits | edge << i) & block.attached;
+        let mut contested = 0;
         let mut left = at_edge;
         while left != 0 {
             let pixel = first + left.trailing_zeros() as usize;
             left &= left - 1;
+            contested += self.contested(pixel);
             self.state[pixel] = RIM;
             self.unwrapped[pixel] = f32::NAN;
             self.confidence[pixel] = 0.0;
         }
         [at_edge, contested]
+    }
+
+    /// Number of a pixel's neighbours that look like the same surface but have another count.
+    fn contested(&self, pixel: usize) -> u32 {
+        let (own, brightness) = (self.phase[pixel], self.amplitude[pixel]);
+        let differs = |other: usize| {
+            let known = matches!(self.state[other], HELD | RIM);
+            let (phase, amplitude) = (self.phase[other], [brightness, self.amplitude[other]]);
+            let unwrapped = [own + TAU * self.wraps[pixel] as f32, phase + TAU * self.wraps[other] as f32];
+            known
+                && apart(unwrapped, amplitude, self.noise2)
+                && is_gentle(wrapped(own - phase).abs(), amplitude, self.noise2)
+        };
+        self.neighbours(pixel).into_iter().flatten().map(|other| u32::from(differs(other))).sum()
     }
 
     /// Where the blocks above, to the left, to the right and below begin, as far as there is one.
@@ -251,17 +257,23 @@ impl Attaching<'_> {
         Some(self.width - 1 - block.col as usize).filter(|last| *last < LANES)
     }
 
-    /// The count that continues the neighbour with the smallest step among those that hold. The pixel itself does not hold.
-    fn nearest(&self, pixel: usize) -> Option<i32> {
-        let (own, col) = (self.phase[pixel], pixel % self.width);
-        let sides = [
+    /// The pixels above, to the left, to the right and below, as far as there are such.
+    #[inline(always)]
+    fn neighbours(&self, pixel: usize) -> [Option<usize>; 4] {
+        let col = pixel % self.width;
+        [
             pixel.checked_sub(self.width),
             pixel.checked_sub(1).filter(|_| col > 0),
             Some(pixel + 1).filter(|_| col + 1 < self.width),
-            Some(pixel + self.width),
-        ];
+            Some(pixel + self.width).filter(|below| *below < self.phase.len()),
+        ]
+    }
+
+    /// The count that continues the neighbour with the smallest step among those that hold. The pixel itself does not hold.
+    fn nearest(&self, pixel: usize) -> Option<i32> {
+        let own = self.phase[pixel];
         let mut best = (f32::INFINITY, None);
-        for other in sides.into_iter().flatten().filter(|&other| self.state.get(other) == Some(&HELD)) {
+        for other in self.neighbours(pixel).into_iter().flatten().filter(|&other| self.state[other] == HELD) {
             let step = wrapped(own - self.phase[other]).abs();
             if step < best.0 {
                 best = (step, Some(self.wraps[other] + wrap_step(self.phase[other], own)));

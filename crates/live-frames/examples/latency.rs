@@ -34,6 +34,7 @@ fn main() {
     every.unwrap.carry.refresh_frames = 1;
     let mut tree = Processor::new(&sequence.camera(), &sequence.calibration(), every, Limits::default()).unwrap();
     keep_map(&mut processor, tracking);
+    let mut of_kinds = [Vec::new(), Vec::new()];
     let (mut milliseconds, mut of_tree) = (Vec::with_capacity(frames), Vec::new());
     let mut of_processor = Vec::with_capacity(frames);
     let (mut whole, mut checks, mut failed, mut memory) = (0, 0, 0.0, [0; 2]);
@@ -52,6 +53,7 @@ fn main() {
         }
         let frame = processor.last();
         whole += usize::from(frame.counts.whole.is_some());
+        of_kinds[usize::from(frame.counts.checked)].extend(of_processor.last());
         checks += usize::from(frame.counts.checked);
         failed += frame.counts.failed as f64 / frame.counts.used.max(1) as f64;
         lost += usize::from(is_lost(frame));
@@ -74,6 +76,11 @@ fn main() {
     println!("|---|---|---|---|---|---|---|");
     row("processor time", of_processor);
     row("by the clock", milliseconds);
+    if frequencies == 1 {
+        let [others, checked] = of_kinds;
+        row("processor time of frames that a small image checks", checked);
+        row("processor time of the others", others);
+    }
     if beside {
         row("by the clock, full tree on every frame", of_tree);
     }
@@ -89,7 +96,7 @@ fn row(name: &str, mut milliseconds: Vec<f64>) {
     let count = milliseconds.len() as f64;
     let mean = milliseconds.iter().sum::<f64>() / count;
     milliseconds.sort_unstable_by(f64::total_cmp);
-    let share = |share: f64| milliseconds[((count - 1.0) * share).round() as usize];
+    let share = |share: f64| milliseconds.get(((count - 1.0) * share).round() as usize).copied().unwrap_or(f64::NAN);
     println!(
         "| {name} | {:.2} | {:.2} | {mean:.2} | {:.2} | {:.2} | {:.1} |",
         share(0.0),

@@ -37,9 +37,6 @@ pub(crate) struct Attaching<'a> {
     pub before: &'a mut [f32],
     pub wraps: &'a mut [i32],
     pub confidence: &'a mut [f32],
-    /// How often in a row each pixel was contradicted: with its count, a pixel takes over what speaks against it, so that a
-    /// surface that moves through the image cannot escape.
-    pub doubts: &'a mut [u8],
     pub noise2: f32,
     pub maximum_wraps: i32,
 }
@@ -83,8 +80,8 @@ impl Attaching<'_> {
     }
 
     /// The other sweeps, and the setting aside: pixels attached at edges have a count for this frame only. Gives the number of those
-    /// that were attached, and of those at edges; lists those that are left.
-    pub fn grow(&mut self, blocks: &mut [Block], open: &mut Vec<u32>) -> [usize; 2] {
+    /// that were attached, of those at edges, and of their neighbours that continue them with another count; lists those that are left.
+    pub fn grow(&mut self, blocks: &mut [Block], open: &mut Vec<u32>) -> [usize; 3] {
         let left = |blocks: &[Block]| blocks.iter().map(|block| block.open.count_ones()).sum::<u32>();
         let mut before = left(blocks);
         for sweep in 1..SWEEPS {
@@ -99,12 +96,13 @@ impl Attaching<'_> {
             }
             before = now;
         }
-        let mut counts = [0; 2];
+        let mut counts = [0; 3];
         with_wide_registers(
             #[inline(always)]
             || {
                 for block in blocks.iter() {
-                    let at_edge = if block.attached == 0 { 0 } else { self.set_aside(block) };
+                    let [at_edge, contested] = if block.attached == 0 { [0; 2] } else { self.set_aside(block) };
+                    counts[2] += contested as usize;
                     counts[1] += at_edge.count_ones() as usize;
                     counts[0] += block.attached.count_ones() as usize;
                 }
@@ -178,7 +176,6 @@ impl Attaching<'_> {
         }
         self.wraps[pixel] = wraps;
         self.confidence[pixel] = self.confidence[other];
-        self.doubts[pixel] = self.doubts[other];
         self.unwrapped[pixel] = own + TAU * wraps as f32;
         self.before[pixel] = self.amplitude[pixel];
         self.state[pixel] = HELD;
@@ -187,9 +184,10 @@ impl Attaching<'_> {
     }
 
     /// A pixel with a neighbour on another surface may belong to that one, or to neither, as slivers and mixed pixels do: it has
-    /// its count for this frame, and says that it is a guess. Gives those of the attached ones of a block that do, a bit each.
+    /// its count for this frame, and says that it is a guess. Gives those of the attached ones of a block that do, a bit each, and how
+    /// many neighbours look like the same surface but have another count.
     #[inline(always)]
-    fn set_aside(&mut self, block: &Block) -> u32 {
+    fn set_aside(&mut self, block: &Block) -> [u32; 2] {
         let first = block.first as usize;
         let (phase, brightness, wraps) =
             (here(self.phase, first), here(self.amplitude, first), here(self.wraps, first));
@@ -213,15 +211,31 @@ impl Attaching<'_> {
             }
         }
         let at_edge = edges.iter().enumerate().fold(0, |bits, (i, edge)| bits | edge << i) & block.attached;
+        let mut contested = 0;
         let mut left = at_edge;
         while left != 0 {
             let pixel = first + left.trailing_zeros() as usize;
             left &= left - 1;
+            contested += self.contested(pixel);
             self.state[pixel] = RIM;
             self.unwrapped[pixel] = f32::NAN;
             self.confidence[pixel] = 0.0;
         }
-        at_edge
+        [at_edge, contested]
+    }
+
+    /// Number of a pixel's neighbours that look like the same surface but have another count.
+    fn contested(&self, pixel: usize) -> u32 {
+        let (own, brightness) = (self.phase[pixel], self.amplitude[pixel]);
+        let differs = |other: usize| {
+            let known = matches!(self.state[other], HELD | RIM);
+            let (phase, amplitude) = (self.phase[other], [brightness, self.amplitude[other]]);
+            let unwrapped = [own + TAU * self.wraps[pixel] as f32, phase + TAU * self.wraps[other] as f32];
+            known
+                && apart(unwrapped, amplitude, self.noise2)
+                && is_gentle(wrapped(own - phase).abs(), amplitude, self.noise2)
+        };
+        self.neighbours(pixel).into_iter().flatten().map(|other| u32::from(differs(other))).sum()
     }
 
     /// Where the blocks above, to the left, to the right and below begin, as far as there is one.
@@ -243,17 +257,23 @@ impl Attaching<'_> {
         Some(self.width - 1 - block.col as usize).filter(|last| *last < LANES)
     }
 
-    /// The count that continues the neighbour with the smallest step among those that hold. The pixel itself does not hold.
-    fn nearest(&self, pixel: usize) -> Option<i32> {
-        let (own, col) = (self.phase[pixel], pixel % self.width);
-        let sides = [
+    /// The pixels above, to the left, to the right and below, as far as there are such.
+    #[inline(always)]
+    fn neighbours(&self, pixel: usize) -> [Option<usize>; 4] {
+        let col = pixel % self.width;
+        [
             pixel.checked_sub(self.width),
             pixel.checked_sub(1).filter(|_| col > 0),
             Some(pixel + 1).filter(|_| col + 1 < self.width),
-            Some(pixel + self.width),
-        ];
+            Some(pixel + self.width).filter(|below| *below < self.phase.len()),
+        ]
+    }
+
+    /// The count that continues the neighbour with the smallest step among those that hold. The pixel itself does not hold.
+    fn nearest(&self, pixel: usize) -> Option<i32> {
+        let own = self.phase[pixel];
         let mut best = (f32::INFINITY, None);
-        for other in sides.into_iter().flatten().filter(|&other| self.state.get(other) == Some(&HELD)) {
+        for other in self.neighbours(pixel).into_iter().flatten().filter(|&other| self.state[other] == HELD) {
             let step = wrapped(own - self.phase[other]).abs();
             if step < best.0 {
                 best = (step, Some(self.wraps[other] + wrap_step(self.phase[other], own)));

@@ -76,6 +76,11 @@ impl Coarse {
         [&self.phase.as_slice()[at.clone()], &self.out.confidence.as_slice()[at]]
     }
 
+    /// Amplitudes of a row.
+    pub fn amplitudes(&self, row: usize) -> &[f32] {
+        &self.amplitude.as_slice()[row * self.phase.width()..][..self.phase.width()]
+    }
+
     /// Counts of a row.
     pub fn wraps(&self, row: usize) -> &[i32] {
         &self.out.wraps.as_slice()[row * self.phase.width()..][..self.phase.width()]

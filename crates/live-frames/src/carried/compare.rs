@@ -4,14 +4,14 @@
 
 use std::f32::consts::TAU;
 
+use phase_unwrap::wrapped;
 use range_image::{Raster, with_wide_registers};
 
 use crate::carried::coarse::Coarse;
-use crate::carried::pixels::{HELD, OPEN, RIM};
+use crate::carried::pixels::{HELD, OPEN, RIM, is_gentle};
 
-/// Checks in a row that contradict a pixel's count before it gives way. A single tree errs on single frames; with one check, the
-/// counts would follow it. With more, what passed wrongly stays longer.
-const CHECKS: u8 = 2;
+/// Confidence of the small image from which a pixel that took its count is as sure at once; below it the next check must agree first.
+const CLEAR: f32 = 0.9;
 /// Adding and taking off 1.5 * 2^23 rounds to an integer.
 const ROUND: f32 = 12_582_912.0;
 
@@ -24,12 +24,11 @@ pub(crate) struct Compared<'a> {
     pub before: &'a mut [f32],
     pub wraps: &'a mut [i32],
     pub confidence: &'a mut [f32],
-    /// How often in a row each pixel was contradicted.
-    pub doubts: &'a mut [u8],
     /// Phases and confidences of the small image, a value for each pixel of a row.
     pub spread: &'a mut [Vec<f32>; 2],
-    /// Columns where blocks of a row begin in which pixels contradict or have no count.
-    pub settled: &'a mut Vec<usize>,
+    /// Blocks of a row in which pixels contradict or have no count: the column where each begins, and those pixels, a bit each.
+    pub settled: &'a mut Vec<(usize, u32)>,
+    pub noise2: f32,
     pub maximum_wraps: i32,
     pub minimum_confidence: f32,
 }
@@ -37,13 +36,16 @@ pub(crate) struct Compared<'a> {
 /// What came of it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Outcome {
+    /// Pixels that took a count that is not sure.
     pub doubted: usize,
+    /// Pixels whose own count was another.
     pub mended: usize,
 }
 
 impl Compared<'_> {
-    /// Pixels that agree are as sure as the small image, if they were not surer; those that contradict it are not sure, and give way
-    /// when they did often enough; those without a count take its.
+    /// Pixels that agree are as sure as the small image, if they were not surer. Those that contradict it take its count where they have the
+    /// phase and the amplitude of what it shows there, and so do those without a count. Of others it says nothing: at edges it mixes
+    /// surfaces, and belongs to neither.
     pub fn check(&mut self, coarse: &Coarse) -> Outcome {
         let (width, height) = (self.phase.width(), self.phase.height());
         let (mut outcome, mut settled) = (Outcome::default(), std::mem::take(self.settled));
@@ -60,7 +62,6 @@ impl Compared<'_> {
                 wraps: &self.wraps[at.clone()],
                 state: &self.state[at.clone()],
                 confidence: &mut self.confidence[at.clone()],
-                doubts: &mut self.doubts[at.clone()],
             };
             let least = self.minimum_confidence;
             settled.clear();
@@ -68,40 +69,43 @@ impl Compared<'_> {
                 #[inline(always)]
                 || compared.check(least, &mut settled),
             );
-            for start in settled.drain(..) {
-                self.settle(at.start, start..(start + LANES).min(width), &mut outcome);
+            for block in settled.drain(..) {
+                self.settle(row, coarse, block, &mut outcome);
             }
         }
         *self.settled = settled;
         outcome
     }
 
-    /// Pixels that contradict or have no count, among some of the row whose first pixel is given.
-    fn settle(&mut self, first: usize, columns: std::ops::Range<usize>, outcome: &mut Outcome) {
-        for column in columns {
+    /// Pixels of a block of a row that contradict or have no count.
+    fn settle(&mut self, row: usize, coarse: &Coarse, (start, mut left): (usize, u32), outcome: &mut Outcome) {
+        let first = row * self.phase.width();
+        let amplitudes = coarse.amplitudes(row / coarse.factor);
+        while left != 0 {
+            let column = start + left.trailing_zeros() as usize;
+            left &= left - 1;
             let pixel = first + column;
             let open = self.state[pixel] == OPEN;
-            if !open && self.doubts[pixel] == 0 {
-                continue;
-            }
             let [spread, sure] = &*self.spread;
-            let (phase, sure) = (self.phase.as_slice()[pixel], sure[column]);
-            let count = ((spread[column] - phase) / TAU).round();
+            let (spread, sure) = (spread[column], sure[column]);
+            let (phase, amplitude) = (self.phase.as_slice()[pixel], self.amplitude.as_slice()[pixel]);
+            let count = ((spread - phase) / TAU).round();
             if !(0.0..=self.maximum_wraps as f32).contains(&count) {
                 continue;
             }
-            if open || self.doubts[pixel] >= CHECKS {
-                self.wraps[pixel] = count as i32;
-                self.unwrapped[pixel] = phase + TAU * count;
-                self.before[pixel] = self.amplitude.as_slice()[pixel];
-                self.confidence[pixel] = sure;
-                self.doubts[pixel] = 0;
-                self.state[pixel] = HELD;
-                outcome.mended += usize::from(!open);
-            } else {
-                self.confidence[pixel] = 0.0;
-                outcome.doubted += 1;
+            let same =
+                is_gentle(wrapped(phase - spread).abs(), [amplitude, amplitudes[column / coarse.factor]], self.noise2);
+            if !open && !same {
+                continue;
             }
+            let clear = if open { same } else { sure >= CLEAR };
+            self.wraps[pixel] = count as i32;
+            self.unwrapped[pixel] = phase + TAU * count;
+            self.before[pixel] = amplitude;
+            self.confidence[pixel] = if clear { sure } else { 0.0 };
+            self.state[pixel] = HELD;
+            outcome.mended += usize::from(!open);
+            outcome.doubted += usize::from(!clear);
         }
     }
 
@@ -125,82 +129,70 @@ struct Row<'a> {
     wraps: &'a [i32],
     state: &'a [u8],
     confidence: &'a mut [f32],
-    doubts: &'a mut [u8],
 }
 
 /// Pixels taken at a time, so that the compiler can vectorise.
 const LANES: usize = 32;
 
 impl Row<'_> {
-    /// Compares all pixels, and lists where blocks begin in which any contradicts or has no count.
+    /// Compares all pixels, and lists the blocks in which any contradicts or has no count.
     #[inline(always)]
-    fn check(&mut self, least: f32, settled: &mut Vec<usize>) {
+    fn check(&mut self, least: f32, settled: &mut Vec<(usize, u32)>) {
         let whole = self.phase.len() / LANES * LANES;
         for start in (0..whole).step_by(LANES) {
-            if self.pixels::<LANES>(start, least).unwrap_or(0) != 0 {
-                settled.push(start);
+            let any = self.pixels::<LANES>(start, least).unwrap_or(0);
+            if any != 0 {
+                settled.push((start, any));
             }
         }
         let mut any = 0;
         for start in whole..self.phase.len() {
-            any |= self.pixels::<1>(start, least).unwrap_or(0);
+            any |= self.pixels::<1>(start, least).unwrap_or(0) << (start - whole);
         }
         if any != 0 {
-            settled.push(whole);
+            settled.push((whole, any));
         }
     }
 
-    /// `L` pixels from `start` on; `None` beyond the row.
+    /// `L` pixels from `start` on: those that contradict or have no count, a bit each; `None` beyond the row.
     #[inline(always)]
     fn pixels<const L: usize>(&mut self, start: usize, least: f32) -> Option<u32> {
         let (spread, sure) = (self.spread[start..].first_chunk::<L>()?, self.sure[start..].first_chunk::<L>()?);
         let (phase, wraps) = (self.phase[start..].first_chunk::<L>()?, self.wraps[start..].first_chunk::<L>()?);
         let state = self.state[start..].first_chunk::<L>()?;
         let confidence = self.confidence[start..].first_chunk_mut::<L>()?;
-        let doubts = self.doubts[start..].first_chunk_mut::<L>()?;
-        if agree(spread, phase, wraps, state, doubts) {
+        if agree(spread, phase, wraps, state) {
             for i in 0..L {
                 confidence[i] = if confidence[i] > sure[i] { confidence[i] } else { sure[i] };
             }
             return Some(0);
         }
         // As wide as the values that they are compared with.
-        let (mut states, mut counted) = ([0_u32; L], [0_u32; L]);
+        let mut states = [0_u32; L];
         for i in 0..L {
             states[i] = u32::from(state[i]);
-            counted[i] = u32::from(doubts[i]) + 1;
         }
         let mut any = [0_u32; L];
         for i in 0..L {
             let agrees = is_count(wraps[i], spread[i], phase[i]);
             let known = states[i] == u32::from(HELD);
-            let aside = (states[i] == u32::from(RIM)) & agrees;
+            let aside = states[i] == u32::from(RIM);
             let own = confidence[i];
             let told = (sure[i] >= least) & !agrees & known;
             let kept = if own > sure[i] { own } else { sure[i] };
-            confidence[i] = if (agrees & known) | aside { kept } else { own };
-            counted[i] = if told { counted[i] } else { 0 };
-            any[i] = counted[i] | u32::from(states[i] == u32::from(OPEN));
+            confidence[i] = if agrees & (known | aside) { kept } else { own };
+            any[i] = u32::from(told | (states[i] == u32::from(OPEN)));
         }
-        for i in 0..L {
-            doubts[i] = counted[i] as u8;
-        }
-        Some(any.iter().fold(0, |all, one| all | one))
+        Some(any.iter().enumerate().fold(0, |bits, (i, one)| bits | one << i))
     }
 }
 
-/// Whether all pixels hold, agree and were not contradicted before, as in nearly all blocks.
+/// Whether all pixels hold and agree, as in nearly all blocks.
 #[inline(always)]
-fn agree<const L: usize>(
-    spread: &[f32; L],
-    phase: &[f32; L],
-    wraps: &[i32; L],
-    state: &[u8; L],
-    doubts: &[u8; L],
-) -> bool {
+fn agree<const L: usize>(spread: &[f32; L], phase: &[f32; L], wraps: &[i32; L], state: &[u8; L]) -> bool {
     let (mut other, mut all) = (0, u32::MAX);
     for i in 0..L {
-        other |= (state[i] ^ HELD) | doubts[i];
+        other |= state[i] ^ HELD;
     }
     for i in 0..L {
         all &= u32::from(is_count(wraps[i], spread[i], phase[i])).wrapping_neg();

@@ -11,7 +11,8 @@ pub struct CarryOptions {
     /// and swift motion costs whole trees; larger, and more of a frame rests on what is left of the one before.
     pub most_failed: f32,
     /// Every so many frames the counts are held against those of a small image of the frame, which the tree solves knowing
-    /// nothing of the frames before; more often where pixels are left without a count. 1: in every frame. Default: 3, a tenth
+    /// nothing of the frames before; more often where pixels are left without a count, or neighbours that look like one surface
+    /// differ in theirs. 1: in every frame. Default: 3, a tenth
     /// of a second at 30 Hz.
     pub check_frames: u32,
 }
@@ -62,9 +63,10 @@ pub struct CarrySummary {
     pub attached: usize,
     /// Whether the counts were held against those of a small image.
     pub checked: bool,
-    /// Pixels whose count contradicts it, or did when it was made last; their confidence is 0.
+    /// Pixels that took its count where it is not sure of it, or shows another surface than they do; their confidence is 0 until the
+    /// next check agrees.
     pub doubted: usize,
-    /// Pixels that took its count, after it had contradicted theirs often enough.
+    /// Pixels that took its count because it contradicted theirs.
     pub mended: usize,
     /// Pixels whose count is a guess for this frame, from a neighbour: at edges, and where none is on the same surface. Their
     /// confidence is 0.

@@ -9,8 +9,8 @@ use crate::carried::options::{CarryOptions, CarrySummary, WholeFrame};
 use crate::carried::pixels::{HELD, LANES, Limits, MASKED, OPEN, Row, carry_row};
 use phase_unwrap::{Error, KnownWraps, SpatialOptions, Unwrapped, Unwrapper};
 
-/// Share of the pixels that may be left without a count, or in contradiction, until the next check; beyond it the frame is
-/// checked at once.
+/// Share of the pixels that may be left without a count, and of pairs of neighbours that may look like one surface and differ in
+/// their counts, as where a revealed surface was given that of another; beyond it the frame is checked at once.
 const LEFT_SHARE: f32 = 1e-3;
 
 /// Absolute counts of one frequency in a stream of frames, for a small part of what the tree costs.
@@ -19,8 +19,8 @@ const LEFT_SHARE: f32 = 1e-3;
 /// changed by less than half an ambiguity interval. That is checked: the phase may step by half a radian, or four standard
 /// deviations, and amplitude times range squared may not change beyond its noise. A pixel that fails takes the count of a
 /// neighbour on the same surface. What passed wrongly, and what is left, is told by a small image of the frame (means of 4 by 4
-/// pixels at 640 x 480) that the tree solves as a whole, every few frames and knowing nothing of those before: what contradicts
-/// it is not sure, and gives way when it did so twice in a row. Every [`refresh_frames`](CarryOptions::refresh_frames), and where too
+/// pixels at 640 x 480) that the tree solves as a whole, every few frames and knowing nothing of those before: what looks like the
+/// surface that it shows there, and contradicts it, takes its count. Every [`refresh_frames`](CarryOptions::refresh_frames), and where too
 /// much fails, the tree solves the whole frame as [`Unwrapper`] does, to the bit.
 ///
 /// A frame without a check allocates nothing.
@@ -36,15 +36,12 @@ pub struct CarriedUnwrapper {
     unwrapped: Vec<f32>,
     before: Vec<f32>,
     state: Vec<u8>,
-    doubts: Vec<u8>,
     /// Blocks of pixels some of which failed, in the order of the image.
     blocks: Vec<Block>,
     open: Vec<u32>,
     spread: [Vec<f32>; 2],
-    settled: Vec<usize>,
+    settled: Vec<(usize, u32)>,
     noise2: f32,
-    /// Pixels that contradicted the small image when it was made last.
-    doubted: usize,
     /// Frames since the tree; `None` before the first.
     age: Option<u32>,
 }
@@ -131,8 +128,6 @@ impl CarriedUnwrapper {
         }
         self.state.clear();
         self.state.resize(width * height, MASKED);
-        self.doubts.clear();
-        self.doubts.resize(width * height, 0);
         self.spread = [vec![f32::NAN; width], vec![f32::NAN; width]];
         self.blocks.clear();
         self.blocks.reserve(width.div_ceil(LANES) * height);
@@ -157,8 +152,6 @@ impl CarriedUnwrapper {
             *before = amplitude;
             *state = if phase.is_finite() { HELD } else { MASKED };
         }
-        self.doubts.fill(0);
-        self.doubted = 0;
         self.coarse.forget_constant();
         Ok(())
     }
@@ -214,10 +207,10 @@ impl CarriedUnwrapper {
         summary: &mut CarrySummary,
     ) -> Result<(), Error> {
         let (mut blocks, mut open) = (std::mem::take(&mut self.blocks), std::mem::take(&mut self.open));
-        let [attached, at_edges] = self.attaching(phase, amplitude).grow(&mut blocks, &mut open);
+        let [attached, at_edges, contested] = self.attaching(phase, amplitude).grow(&mut blocks, &mut open);
         summary.attached = attached;
         let least = LEFT_SHARE * summary.used as f32;
-        let urgent = open.len() as f32 > least || self.doubted as f32 > least;
+        let urgent = open.len() as f32 > least || contested as f32 > least;
         if urgent || frame.is_multiple_of(self.carry.check_frames) {
             let options = SpatialOptions { amplitude_noise: self.noise, ..self.options };
             if self.coarse.solve(channel, &options)? {
@@ -240,14 +233,13 @@ impl CarriedUnwrapper {
             before: &mut self.before,
             wraps: self.out.wraps.as_mut_slice(),
             confidence: self.out.confidence.as_mut_slice(),
-            doubts: &mut self.doubts,
             spread: &mut self.spread,
             settled: &mut self.settled,
             maximum_wraps: i32::from(self.options.maximum_wraps),
+            noise2: self.noise2,
             minimum_confidence: self.options.minimum_confidence,
         };
         let outcome = compared.check(&self.coarse);
-        self.doubted = outcome.doubted;
         (summary.checked, summary.doubted, summary.mended) = (true, outcome.doubted, outcome.mended);
     }
 
@@ -261,7 +253,6 @@ impl CarriedUnwrapper {
             before: &mut self.before,
             wraps: self.out.wraps.as_mut_slice(),
             confidence: self.out.confidence.as_mut_slice(),
-            doubts: &mut self.doubts,
             noise2: self.noise2,
             maximum_wraps: i32::from(self.options.maximum_wraps),
         }

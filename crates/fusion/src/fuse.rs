@@ -225,7 +225,13 @@ impl Task<'_> {
     ) -> Result<(Vec<Row>, Vec<Squares>)> {
         let of_place = |place: &Estimate| {
             let rows = common::rows(place, &place.normal, &observations.all, self.errors, common)?;
-            Ok((common::mean(place, &rows), Squares::new(place, &rows, common)))
+            let mean = common::mean(place, &rows);
+            // Frames of one station show noise, and little of what stations disagree by.
+            let (of_stations, of_rows) = common::by_station(place, rows.clone());
+            let several = of_stations.frames.len() > 1;
+            let squares =
+                if several { Squares::new(&of_stations, &of_rows, common) } else { Squares::new(place, &rows, common) };
+            Ok((mean, squares))
         };
         let all: Vec<_> = gathered.estimates.par_iter().with_min_len(64).map(of_place).collect::<Result<_>>()?;
         Ok(all.into_iter().unzip())

@@ -83,6 +83,21 @@ fn where_frames_disagree_beyond_what_is_stated_sigma_says_so() {
 }
 
 #[test]
+fn many_frames_of_a_station_are_no_independent_stations() {
+    // They average noise; where a surface is none in a cell, all of them see the same.
+    let plan = Plan { frames: 8, size: (64, 48), ..Plan::default() };
+    let mut judged = Judgement::default();
+    for seed in 5..8 {
+        let survey = Survey::new(&plan, seed);
+        let fused = fuse(&survey.registered(), &survey, &survey.common, &FusionOptions::default()).unwrap();
+        assert!(fused.apart.is_empty(), "{:?}", fused.apart);
+        judged.add(&survey, &fused);
+    }
+    let (all, corrections) = (judged.mean("all"), judged.corrections.iter().sum::<f64>() / 3.0);
+    assert!((0.6..1.4).contains(&all) && corrections < 1.3, "{all} {corrections}");
+}
+
+#[test]
 fn what_bends_everywhere_is_not_noise() {
     // Waves with a radius of curvature of 0.25 m, five cells, at their crests; points move along their rays to them.
     let mut wall = Wall::new(4, 160, 0.0005, 0.0, 1e-6, 9);

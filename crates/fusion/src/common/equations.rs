@@ -10,7 +10,7 @@ use point_uncertainty::{CommonErrors, PointErrors};
 use rayon::prelude::*;
 use statistics::Distribution;
 
-use super::rows::{Row, rows};
+use super::rows::{Row, by_station, rows};
 use crate::Result;
 use crate::input::{NO_NEIGHBOURHOOD, Observations};
 use crate::patches::largest_sum;
@@ -102,7 +102,7 @@ pub(crate) fn ties(
     let tie = |at: &usize| {
         let place = estimate(&gathered.seeds[*at].1, &gathered.members[*at], &observations.all, &shared)?;
         let rows = rows(&place, &around[*at].normal, &observations.all, errors, common);
-        Some(rows.map(|rows| (place, rows)))
+        rows.map(|rows| Some(by_station(&place, rows)).filter(|(place, _)| place.frames.len() > 1)).transpose()
     };
     used.par_iter().with_min_len(32).filter_map(tie).collect()
 }

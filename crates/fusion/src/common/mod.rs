@@ -11,6 +11,6 @@ mod trust;
 
 pub(crate) use disagreement::{Squares, variance_factors};
 pub(crate) use isolate::{Conditioned, condition};
-pub(crate) use rows::{Row, form, mean, rows};
+pub(crate) use rows::{Row, by_station, form, mean, rows};
 pub(crate) use shared_error::without_shared;
 pub(crate) use split::split;

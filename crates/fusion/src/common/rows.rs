@@ -5,7 +5,7 @@ use point_uncertainty::{CommonErrors, PointErrors};
 
 use crate::Result;
 use crate::input::{Observation, derivatives};
-use crate::surfels::Estimate;
+use crate::surfels::{Estimate, FrameSums};
 
 /// Column and derivative, in ascending order of the columns.
 pub(crate) type Row = Vec<(u32, f64)>;
@@ -39,6 +39,25 @@ pub(crate) fn rows(
             Ok(row)
         })
         .collect()
+}
+
+/// The frames of a place that move alike taken as one: what they differ by tells nothing of common errors, and what is wrong with a
+/// place is wrong with all of them, which so many independent frames would hide.
+pub(crate) fn by_station(place: &Estimate, rows: Vec<Row>) -> (Estimate, Vec<Row>) {
+    let is_same = |a: &Row, b: &Row| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.0 == b.0);
+    let mut merged: Vec<(FrameSums, Row)> = Vec::new();
+    for (frame, row) in place.frames.iter().zip(rows) {
+        match merged.iter_mut().find(|(_, other)| is_same(other, &row)) {
+            Some((first, mean)) => {
+                let share = frame.normal[(0, 0)] / (first.normal[(0, 0)] + frame.normal[(0, 0)]);
+                mean.iter_mut().zip(&row).for_each(|((_, mean), (_, by))| *mean += share * (by - *mean));
+                first.include(frame);
+            }
+            None => merged.push((frame.clone(), row)),
+        }
+    }
+    let (frames, rows) = merged.into_iter().unzip();
+    (Estimate { frames, ..place.clone() }, rows)
 }
 
 /// The derivative of the mean height.

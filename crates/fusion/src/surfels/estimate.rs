@@ -41,6 +41,20 @@ pub(crate) struct FrameSums {
     second_moments: Vector3<f64>,
 }
 
+impl FrameSums {
+    /// Adds what another frame saw.
+    pub fn include(&mut self, other: &Self) {
+        self.count += other.count;
+        self.normal += other.normal;
+        self.right += other.right;
+        self.square += other.square;
+        self.noise += other.noise;
+        self.sensor += other.sensor;
+        self.shared += other.shared;
+        self.second_moments += other.second_moments;
+    }
+}
+
 /// A place with its plane.
 #[derive(Debug, Clone)]
 pub(crate) struct Estimate {

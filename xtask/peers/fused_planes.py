@@ -167,4 +167,5 @@ def main(path, result=None):
         print(line(name, distances, standardised) + single)
 
 
-main(*sys.argv[1:])
+if __name__ == "__main__":
+    main(*sys.argv[1:])

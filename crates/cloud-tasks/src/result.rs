@@ -40,6 +40,8 @@ pub(crate) struct ResultCloud {
     pub(crate) not_in_it: Vec<String>,
     /// Names of the frames, as the common errors count them.
     pub(crate) views: Vec<String>,
+    /// Names of the stations that the frames are of.
+    pub(crate) station_names: Vec<String>,
     /// Flags of the points, where the cloud has them.
     pub(crate) flags: Option<Vec<u16>>,
     /// The image of a camera whose frames share an error that no calibration has: its depths come from a pattern or from two images.
@@ -102,10 +104,10 @@ impl ResultCloud {
             return Err(wrong(format!("point {point} of the cloud is of frame {}, there are {frames}", frame[point])));
         }
         let not_in_it = errors.not_in_it;
-        let views = errors.frames.into_iter().map(|frame| frame.view).collect();
+        let (views, station_names) = errors.frames.into_iter().map(|frame| (frame.view, frame.station)).unzip();
         let has_camera = errors.calibration.is_some();
         let alone = Self::new(file, stations, common, errors.calibration);
-        let read = Self { not_in_it, views, depth_image, has_camera, ..alone };
+        let read = Self { not_in_it, views, station_names, depth_image, has_camera, ..alone };
         fits_its_frames(&read).map_err(|wrong| request(format!("{}: {wrong}", path.display())))?;
         Ok(read)
     }
@@ -130,6 +132,7 @@ impl ResultCloud {
             calibration,
             not_in_it: Vec::new(),
             views: Vec::new(),
+            station_names: Vec::new(),
             flags: file.flags,
             depth_image: None,
             has_camera: false,

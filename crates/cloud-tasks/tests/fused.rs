@@ -4,7 +4,7 @@ use cloud_tasks::commands::{DoubtKind, Error, Failure, Judged, Silent, Verdict};
 use cloud_tasks::measurement::nalgebra::Vector3;
 use cloud_tasks::range_io::clouds::{CloudFile, CloudFormat, read_any_cloud};
 use cloud_tasks::range_io::ply::read_cloud;
-use cloud_tasks::{FuseRequest, FuseSummary, fuse};
+use cloud_tasks::{FrameErrors, FuseRequest, FuseSummary, fuse};
 
 use crate::results::Folder;
 
@@ -126,6 +126,28 @@ fn a_station_far_from_its_pose_is_named() {
     assert!(doubt.kind == DoubtKind::Contradiction && doubt.subject.as_deref() == Some("S1"), "{doubt:?}");
     assert_eq!(summary.verdict(), Verdict::Doubtful);
     assert!(folder.read("report.html").contains("Stations that do not fit"));
+}
+
+#[test]
+fn frames_of_a_station_that_were_not_averaged_are_a_doubt() {
+    let folder = Folder::new(9);
+    let said_of = |frames: u32| {
+        let station = |point: usize| folder.survey.errors.of_points[point].station as u32;
+        folder.write_cloud_of_frames(&[], |point| station(point) * frames + point as u32 % frames);
+        let mut errors = folder.common_errors();
+        let copies = |frame: FrameErrors| {
+            let copy = move |number| FrameErrors { view: format!("{}, frame {number}", frame.view), ..frame.clone() };
+            (0..frames).map(copy)
+        };
+        errors.frames = errors.frames.into_iter().flat_map(copies).collect();
+        folder.write_errors(&errors);
+        let summary = fused(&folder).unwrap();
+        summary.doubts.into_iter().find(|doubt| doubt.words.contains("Average()"))
+    };
+    assert_eq!(said_of(16), None);
+    let doubt = said_of(17).unwrap();
+    assert!(doubt.kind == DoubtKind::Noise && doubt.subject.as_deref() == Some("S2"), "{doubt:?}");
+    assert!(doubt.words.starts_with("17 frames") && doubt.words.contains("than 16: 3)"), "{doubt:?}");
 }
 
 #[test]

@@ -43,6 +43,11 @@ impl Folder {
 
     /// With these points flagged.
     pub fn write_cloud(&self, flagged: &[usize]) {
+        self.write_cloud_of_frames(flagged, |point| self.survey.errors.of_points[point].station as u32);
+    }
+
+    /// The same with the frame of each point.
+    pub fn write_cloud_of_frames(&self, flagged: &[usize], frame: impl Fn(usize) -> u32) {
         let survey = &self.survey;
         let of_points = &survey.errors.of_points;
         let flag = |point: usize| u16::from(flagged.contains(&point));
@@ -51,7 +56,7 @@ impl Folder {
             intensity: Some(vec![100.0; survey.points.len()]),
             sigma: Some(of_points.iter().map(|of| of.sigma_m as f32).collect()),
             flags: Some((0..survey.points.len()).map(flag).collect()),
-            frame: Some(of_points.iter().map(|of| of.station as u32).collect()),
+            frame: Some((0..survey.points.len()).map(frame).collect()),
             ..CloudFile::default()
         };
         write_cloud(self.path("result/cloud.ply"), &cloud, Precision::Single).unwrap();

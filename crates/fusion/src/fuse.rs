@@ -227,10 +227,10 @@ impl Task<'_> {
             let rows = common::rows(place, &place.normal, &observations.all, self.errors, common)?;
             let mean = common::mean(place, &rows);
             // Frames of one station show noise, and little of what stations disagree by.
-            let (of_stations, of_rows) = common::by_station(place, rows.clone());
-            let several = of_stations.frames.len() > 1;
-            let squares =
-                if several { Squares::new(&of_stations, &of_rows, common) } else { Squares::new(place, &rows, common) };
+            let squares = match common::by_station(place, &rows) {
+                Some((stations, rows)) if stations.frames.len() > 1 => Squares::new(&stations, &rows, common),
+                _ => Squares::new(place, &rows, common),
+            };
             Ok((mean, squares))
         };
         let all: Vec<_> = gathered.estimates.par_iter().with_min_len(64).map(of_place).collect::<Result<_>>()?;

@@ -20,6 +20,10 @@ use crate::result::ResultCloud;
 /// Share of the fused points that may be contradicted without a doubt: who walks through a room during a survey hides about so
 /// much of it. With a smaller one every moved chair is a doubt; with a larger one a wall seen twice is none.
 const MANY_CONTRADICTIONS: f64 = 0.01;
+/// Frames of one station beyond which they should be averaged pixel by pixel before they are fused: of points of single frames beside an
+/// edge it does not show which ones another surface has mixed with, so that what these err by stays in the mean. With 16 frames, squared
+/// errors of fused points beside edges are 1.2 of the stated variances, with 64 frames 3.7, with 170 frames 15; averaged first 1.4.
+const MOST_UNAVERAGED: usize = 16;
 
 /// What is known before anything is fused.
 pub(crate) fn begin(asked: &FuseRequest, cloud: &ResultCloud, options: &FusionOptions, ending: &str) -> FuseSummary {
@@ -72,6 +76,7 @@ pub(crate) fn finish(
     summary.noise_factor = fused.noise_factor;
     summary.corrections = corrections(usable.cloud, fused, &nodes);
     findings(summary, fused, !nodes.is_empty());
+    summary.doubts.extend(unaveraged(&usable.cloud.station_names, &usable.frames));
     doubts(summary);
 }
 
@@ -233,6 +238,28 @@ fn disagreement(fused: &Fused) -> Option<String> {
             "At {share:.0} % of the fused points frames disagree beyond what is stated of their errors: the standard deviations there are \
              larger, {factor:.1} times in the median."
         )
+    })
+}
+
+/// More frames of one station than fused points beside edges are right with.
+fn unaveraged(station_names: &[String], frame_of_point: &[u32]) -> Option<Doubt> {
+    let mut is_used = vec![false; station_names.len()];
+    for frame in frame_of_point {
+        is_used[*frame as usize] = true;
+    }
+    let mut of_station: BTreeMap<&str, usize> = BTreeMap::new();
+    for (name, _) in station_names.iter().zip(is_used).filter(|(_, is_used)| *is_used) {
+        *of_station.entry(name).or_default() += 1;
+    }
+    let (station, most) = of_station.iter().max_by_key(|(_, count)| **count)?;
+    (*most > MOST_UNAVERAGED).then(|| {
+        let stations = of_station.values().filter(|count| **count > MOST_UNAVERAGED).count();
+        let words = format!(
+            "{most} frames of this station were fused without being averaged (stations with more than {MOST_UNAVERAGED}: {stations}): what \
+             edges do to points is not averaged with their noise, so that fused points beside edges err by more than is stated; put \
+             Average() into the pipeline, before the ranges are made points"
+        );
+        Doubt::about(DoubtKind::Noise, *station, words)
     })
 }
 

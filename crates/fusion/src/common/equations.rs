@@ -102,7 +102,8 @@ pub(crate) fn ties(
     let tie = |at: &usize| {
         let place = estimate(&gathered.seeds[*at].1, &gathered.members[*at], &observations.all, &shared)?;
         let rows = rows(&place, &around[*at].normal, &observations.all, errors, common);
-        rows.map(|rows| Some(by_station(&place, rows)).filter(|(place, _)| place.frames.len() > 1)).transpose()
+        let tie = rows.map(|rows| by_station(&place, &rows).unwrap_or((place, rows)));
+        Some(tie).filter(|tie| tie.as_ref().map_or(true, |(place, _)| place.frames.len() > 1))
     };
     used.par_iter().with_min_len(32).filter_map(tie).collect()
 }

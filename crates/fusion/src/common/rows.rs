@@ -42,22 +42,25 @@ pub(crate) fn rows(
 }
 
 /// The frames of a place that move alike taken as one: what they differ by tells nothing of common errors, and what is wrong with a
-/// place is wrong with all of them, which so many independent frames would hide.
-pub(crate) fn by_station(place: &Estimate, rows: Vec<Row>) -> (Estimate, Vec<Row>) {
+/// place is wrong with all of them, which so many independent frames would hide. `None` where no two do.
+pub(crate) fn by_station(place: &Estimate, rows: &[Row]) -> Option<(Estimate, Vec<Row>)> {
     let is_same = |a: &Row, b: &Row| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.0 == b.0);
+    if !rows.iter().enumerate().any(|(at, row)| rows[..at].iter().any(|other| is_same(other, row))) {
+        return None;
+    }
     let mut merged: Vec<(FrameSums, Row)> = Vec::new();
     for (frame, row) in place.frames.iter().zip(rows) {
-        match merged.iter_mut().find(|(_, other)| is_same(other, &row)) {
+        match merged.iter_mut().find(|(_, other)| is_same(other, row)) {
             Some((first, mean)) => {
                 let share = frame.normal[(0, 0)] / (first.normal[(0, 0)] + frame.normal[(0, 0)]);
-                mean.iter_mut().zip(&row).for_each(|((_, mean), (_, by))| *mean += share * (by - *mean));
+                mean.iter_mut().zip(row).for_each(|((_, mean), (_, by))| *mean += share * (by - *mean));
                 first.include(frame);
             }
-            None => merged.push((frame.clone(), row)),
+            None => merged.push((frame.clone(), row.clone())),
         }
     }
     let (frames, rows) = merged.into_iter().unzip();
-    (Estimate { frames, ..place.clone() }, rows)
+    Some((Estimate { frames, ..place.clone() }, rows))
 }
 
 /// The derivative of the mean height.

@@ -9,7 +9,7 @@ use crate::common::{self, Conditioned, Row, Squares, condition, form, split, var
 use crate::input::{Observation, Observations, Registered};
 use crate::options::{CommonErrorUse, FusionOptions};
 use crate::outcome::{Fused, Surfel};
-use crate::patches::{noise_factor, patches, seeds};
+use crate::patches::{if_larger, noise_ratio, patches, seeds};
 use crate::sight::{self, Scene};
 use crate::surfels::{
     self, Alone, Bend, Estimate, FARTHEST, Gathered, Owner, estimate, gather, give_up, is_even, nonempty,
@@ -51,11 +51,12 @@ pub fn fuse(
     let task = Task { input, errors, options };
     let mut found = Conditioned::nothing(input.centres.len(), common);
     let few = thinned(&first, POINTS_FOR_NOISE, TOGETHER);
-    let noise = patches(few.as_ref().unwrap_or(&first), errors, common)?.noise_factor();
+    let within = patches(few.as_ref().unwrap_or(&first), errors, common)?.noise_ratio();
+    let noise = if_larger(within);
     let noisier = |of: Observations| if noise > 1.0 { of.noisier(|_| noise) } else { of };
     let mut observations = noisier(first);
     if !estimates {
-        return task.finish(common, &observations, noise, found);
+        return task.finish(common, &observations, within, found);
     }
     for (pass, points) in POINTS_FOR_COMMON.into_iter().enumerate() {
         if pass > 1 && found.shared.is_none() {
@@ -68,7 +69,7 @@ pub fn fuse(
         found = condition(&task, &found, few, &patches, common, pass > 0)?;
         observations = noisier(input.observe(errors, common, found.posterior.values.as_slice(), options.voxel_m)?);
     }
-    task.finish(&common_of(common, &found.posterior.covariance)?, &observations, noise, found)
+    task.finish(&common_of(common, &found.posterior.covariance)?, &observations, within, found)
 }
 
 /// What is fused, and how.
@@ -110,20 +111,20 @@ fn thinned(observations: &Observations, points: usize, together: usize) -> Optio
 }
 
 impl Task<'_> {
-    /// The fused cloud of points that the common errors which were found have been taken off, and whose noise is taken so many times as
-    /// large as stated; `common` are the errors that remain.
+    /// The fused cloud of points that the common errors which were found have been taken off, and whose noise `within` frames is so many times
+    /// as large as stated, and taken so; `common` are the errors that remain.
     fn finish(
         &self,
         common: &CommonErrors,
         observations: &Observations,
-        noise: f64,
+        within: f64,
         found: Conditioned,
     ) -> Result<Fused> {
         let Self { input, options, .. } = *self;
         let (mut gathered, mut bends) = self.places(common, observations, &found.layers)?;
         let squares = self.rows(&gathered, observations, common)?.1;
         // Half of the places may be where frames see different things.
-        let between = noise_factor(squares.iter().map(|of| (of.sum, of.dof)), 0.5);
+        let between = if_larger(noise_ratio(squares.iter().map(|of| (of.sum, of.dof)), 0.5));
         let noisier = (between > 1.0).then(|| observations.noisier(|_| between));
         let observations = noisier.as_ref().unwrap_or(observations);
         if noisier.is_some() {
@@ -162,7 +163,8 @@ impl Task<'_> {
                 contradictions,
                 outvoted,
                 seen_through: fronts.len(),
-                noise_factor: noise * between,
+                noise_factor: if_larger(within) * between,
+                noise_within_frames: within,
                 apart: found.apart,
                 shared_error: found.shared,
                 corrections: found.posterior.values.iter().copied().collect(),

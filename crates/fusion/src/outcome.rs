@@ -5,6 +5,7 @@ use point_uncertainty::{CommonErrors, PointErrors, Shares, Source};
 
 use crate::common::Row;
 use crate::input::NO_NEIGHBOURHOOD;
+use crate::patches::is_smaller;
 
 /// A fused point: a small piece of a surface.
 #[derive(Debug, Clone, PartialEq)]
@@ -172,6 +173,9 @@ pub struct Fused {
     /// the flattest quarter of the planes of single frames, times what frames differ by at most places beyond that; 1 where it is not. It is in
     /// [`Surfel::shares`].
     pub noise_factor: f64,
+    /// The variance of points about the flattest quarter of the planes of single frames over what is stated of it. Where it is below one
+    /// nothing is taken as smaller: a camera that smooths its images hides its noise there, not between frames.
+    pub noise_within_frames: f64,
     /// Stations that do not fit the others.
     pub apart: Vec<Apart>,
     /// What was found of the common errors, in their units, and has been taken off the points. Zeros where they were not estimated.
@@ -183,6 +187,13 @@ pub struct Fused {
     pub(crate) rows: Vec<Row>,
     /// Neighbourhood with the largest part, and shift of the surfel by its deviation.
     pub(crate) strongest: Vec<(u64, f64)>,
+}
+
+impl Fused {
+    /// Whether points scatter within frames by clearly less than is stated of their noise, so that standard deviations may be too large.
+    pub fn states_too_much(&self) -> bool {
+        is_smaller(self.noise_within_frames)
+    }
 }
 
 impl PointErrors for Fused {

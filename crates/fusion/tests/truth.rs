@@ -2,7 +2,7 @@
 
 use fusion::nalgebra::{DMatrix, Matrix3, Vector3};
 use fusion::point_uncertainty::{CommonError, CommonErrors, PointErrors, Source, shares};
-use fusion::{CommonErrorUse, FusionOptions, Surfel, fuse};
+use fusion::{CommonErrorUse, Fused, FusionOptions, Surfel, fuse};
 
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -34,16 +34,16 @@ fn fused_points_err_as_they_say() {
     assert!(judged.ghosts * 1000 < judged.surfels, "{} of {}", judged.ghosts, judged.surfels);
 }
 
-/// The survey, with half of the standard deviations of noise and neighbourhoods.
-struct Understated<'a>(&'a Survey);
+/// The survey, with so many times the standard deviations of noise and neighbourhoods.
+struct Stated<'a>(&'a Survey, f64);
 
-impl PointErrors for Understated<'_> {
+impl PointErrors for Stated<'_> {
     fn noise(&self, point: usize) -> Matrix3<f64> {
-        self.0.noise(point) * 0.25
+        self.0.noise(point) * self.1.powi(2)
     }
 
     fn sensor(&self, point: usize) -> Option<(u64, Vector3<f64>)> {
-        self.0.sensor(point).map(|(neighbourhood, shift)| (neighbourhood, shift * 0.5))
+        self.0.sensor(point).map(|(neighbourhood, shift)| (neighbourhood, shift * self.1))
     }
 
     fn common(&self, point: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
@@ -65,12 +65,11 @@ fn where_frames_disagree_beyond_what_is_stated_sigma_says_so() {
         disagree += honest.surfels.iter().filter(is_disputed).count();
         seen += honest.surfels.len();
         // Its variance is a quarter of what it should be.
-        let understated = fused(&Understated(&survey));
-        assert!(
-            honest.noise_factor == 1.0 && (3.4..4.6).contains(&understated.noise_factor),
-            "{}",
-            understated.noise_factor
-        );
+        let [understated, overstated] = [0.5, 2.0].map(|factor| fused(&Stated(&survey, factor)));
+        let larger = [&honest, &understated, &overstated].map(|fused| fused.noise_factor);
+        assert!(larger[0] == 1.0 && (3.4..4.6).contains(&larger[1]) && larger[2] == 1.0, "{larger:?}");
+        let smaller = [&honest, &understated, &overstated].map(Fused::states_too_much);
+        assert_eq!(smaller, [false, false, true]);
         for surfel in &understated.surfels {
             let Some((height, _)) = survey.scene.above(&surfel.position, &surfel.normal) else { continue };
             told.push((height / surfel.sigma_m()).powi(2));

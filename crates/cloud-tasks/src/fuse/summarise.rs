@@ -74,6 +74,7 @@ pub(crate) fn finish(
     let nodes = options.shared_error.map_or(0..0, |grid| grid.columns());
     summary.shared_error = shared_error(fused, &nodes);
     summary.noise_factor = fused.noise_factor;
+    summary.noise_within_frames = fused.noise_within_frames;
     summary.corrections = corrections(usable.cloud, fused, &nodes);
     findings(summary, fused, !nodes.is_empty());
     summary.doubts.extend(unaveraged(&usable.cloud.station_names, &usable.frames));
@@ -222,6 +223,13 @@ fn findings(summary: &mut FuseSummary, fused: &Fused, is_depth_camera: bool) {
             "The noise of points is {:.1} times what is stated of it, as they scatter within frames and frames differ on most surfaces: it counts \
              as such.",
             fused.noise_factor.sqrt()
+        ));
+    }
+    if fused.states_too_much() {
+        summary.findings.push(format!(
+            "Within frames, points scatter by {:.1} times what is stated of their noise: it is stated too large, and standard deviations with it, \
+             unless the camera smooths its images.",
+            fused.noise_within_frames.sqrt()
         ));
     }
     summary.findings.extend(disagreement(fused));

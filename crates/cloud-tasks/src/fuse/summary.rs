@@ -43,6 +43,8 @@ pub struct FuseSummary {
     pub shared_error: Option<SharedErrorSummary>,
     /// By how many times the variance of the points' noise is larger than stated, as most surfaces show; 1 where it is not.
     pub noise_factor: f64,
+    /// The variance of points about planes within single frames over what is stated of their noise.
+    pub noise_within_frames: f64,
     /// What was found of the other common errors.
     pub corrections: Vec<Correction>,
     /// What a reader should know, in sentences.

@@ -16,7 +16,7 @@ use crate::lattice::{Runs, neighbour, neighbours};
 use crate::small::{self, Symmetric};
 use moments::{Fit, Moments};
 pub(crate) use moments::{LEAST_FACING, Plane, largest_sum, variance_within};
-pub(crate) use noise::noise_factor;
+pub(crate) use noise::{if_larger, is_smaller, noise_ratio};
 pub(crate) use places::{ONE_SURFACE, Seed, seeds};
 
 /// Part of the patches by which noise is judged, those of the least squares: shapes, edges and what lies about make others of more.
@@ -50,9 +50,9 @@ impl Patches {
         &self.all[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
-    /// By how many times the noise of points within single frames is larger than stated, in the variance.
-    pub fn noise_factor(&self) -> f64 {
-        noise_factor(self.all.iter().filter_map(|patch| patch.squares), FLAT_SHARE)
+    /// The variance of the noise of points within single frames over what is stated.
+    pub fn noise_ratio(&self) -> f64 {
+        noise_ratio(self.all.iter().filter_map(|patch| patch.squares), FLAT_SHARE)
     }
 
     /// The patch of a frame in a cell.

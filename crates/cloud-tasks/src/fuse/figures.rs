@@ -7,10 +7,10 @@ use fusion::{Fused, FusionOptions, Surfel};
 use nalgebra::{Point3, Vector3};
 use point_uncertainty::{SharedErrorGrid, Source};
 use report::{
-    Axes, CATEGORIES, CHART_SIZE, Canvas, ColourMap, Figure, LineOfSight, Scale, deviation_figure, raster_figure,
-    robust_span, span,
+    Axes, CATEGORIES, CHART_SIZE, Canvas, ColourMap, Drawn, Figure, LineOfSight, Scale, deviation_figure,
+    raster_figure, robust_span, span,
 };
-use statistics::quantile;
+use statistics::{quantile, upper_median};
 
 use super::input::Usable;
 use super::summarise::{DISAGREEMENT, SHAPE, mean_shares};
@@ -185,49 +185,82 @@ fn sections(usable: &Usable<'_>, moved: &[Point3<f64>], fused: &Fused, voxel_m: 
     let (before, after) = (in_strip(&usable.points), in_strip(moved));
     let surfels: Vec<(f64, f64)> = fused.surfels.iter().filter_map(|surfel| strip.place(&surfel.position)).collect();
     let all = || before.iter().chain(&after).map(|(_, place)| *place);
-    let frame = Frame { x: span(all().map(|place| place.0)), y: robust_span(all().map(|place| place.1)) };
+    let axes =
+        Section { x: span(all().map(|place| place.0)), y: robust_span(all().map(|place| place.1)), cell_m: voxel_m };
     let views = &usable.cloud.views;
-    vec![
-        frame.draw("Section through a wall: before", &before, &[], views).caption(
-            "Points of the frames, a colour for each, as the result has them, two cells deep. Heights are exaggerated.",
-        ),
-        frame
-            .draw("Section through a wall: after", &after, &surfels, views)
-            .caption("The same with what was found of the common errors taken off, and the fused points (black)."),
-    ]
+    let lines =
+        "grey, and of each frame the median along the wall as a line (dark to bright: in the order of the frames)";
+    let (figure, drawn) = axes.draw("Section through a wall: before", &before, &[], views);
+    let before = figure.caption(format!(
+        "Points of the frames as the result has them, two cells deep, {lines}. Heights are exaggerated.{}",
+        drawn.words()
+    ));
+    let (figure, drawn) = axes.draw("Section through a wall: after", &after, &surfels, views);
+    let after = figure.caption(format!(
+        "The same with what was found of the common errors taken off, and the fused points (black).{}",
+        drawn.words()
+    ));
+    vec![before, after]
 }
 
 /// Frames whose names fit beside the title of a section.
 const MOST_NAMED: usize = 3;
 
+/// Points of a frame, about, that a median is of, and the fewest.
+const POINTS_OF_MEDIAN: f64 = 8.0;
+const FEWEST_OF_MEDIAN: usize = 3;
+const POINTS_GREY: [u8; 3] = [150, 158, 168];
+
 /// Axes that both sections have.
-struct Frame {
+struct Section {
     x: [f64; 2],
     y: [f64; 2],
+    cell_m: f64,
 }
 
-impl Frame {
-    fn draw(&self, title: &str, points: &[(u32, (f64, f64))], surfels: &[(f64, f64)], views: &[String]) -> Figure {
+impl Section {
+    fn draw(
+        &self,
+        title: &str,
+        points: &[(u32, (f64, f64))],
+        surfels: &[(f64, f64)],
+        views: &[String],
+    ) -> (Figure, Drawn) {
         let axes = Axes { title, x: "along the wall, m", y: "along the normal, mm" };
         let mut canvas = Canvas::new(&axes, CHART_SIZE, self.x, self.y);
+        let all: Vec<(f64, f64)> = points.iter().map(|(_, place)| *place).collect();
+        let drawn = canvas.cloud(&all, POINTS_GREY, 0.5);
         let mut frames: Vec<u32> = points.iter().map(|(frame, _)| *frame).collect();
         frames.sort_unstable();
         frames.dedup();
-        // The last colour is that of all further frames. Names of many would not fit beside the title.
-        let own = CATEGORIES.len() - 1;
-        let are_named = frames.len() <= MOST_NAMED;
+        let points_per_m = all.len() as f64 / (frames.len().max(1) as f64 * (self.x[1] - self.x[0]));
+        let step_m = (0.5 * self.cell_m).max(POINTS_OF_MEDIAN / points_per_m);
         for (at, frame) in frames.iter().enumerate() {
-            let places: Vec<(f64, f64)> =
-                points.iter().filter(|(of, _)| of == frame).map(|(_, place)| *place).collect();
-            canvas.points(&places, CATEGORIES[at.min(own)], 0.5);
-            if at < own && are_named {
-                canvas.name(CATEGORIES[at], views.get(*frame as usize).map_or("", String::as_str));
+            let colour = ColourMap::Sequential.colour(at as f64 / frames.len().saturating_sub(1).max(1) as f64);
+            let places = points.iter().filter(|(of, _)| of == frame).map(|(_, place)| *place);
+            canvas.line(&Self::medians(places, step_m), colour, "");
+            // Names of many would not fit beside the title.
+            if frames.len() <= MOST_NAMED {
+                canvas.name(colour, views.get(*frame as usize).map_or("", String::as_str));
             }
         }
-        if frames.len() > own && are_named {
-            canvas.name(CATEGORIES[own], "others");
-        }
         canvas.points(surfels, [0, 0, 0], 1.0);
-        canvas.finish()
+        (canvas.finish(), drawn)
+    }
+
+    /// Medians of heights over so much of the wall each, not a number where there are too few.
+    fn medians(places: impl Iterator<Item = (f64, f64)>, step_m: f64) -> Vec<(f64, f64)> {
+        let mut heights: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
+        for (along, height) in places {
+            heights.entry((along / step_m).floor() as i64).or_default().push(height);
+        }
+        let (Some((first, _)), Some((last, _))) = (heights.first_key_value(), heights.last_key_value()) else {
+            return Vec::new();
+        };
+        let median = |at: i64| {
+            let heights = heights.get(&at).filter(|heights| heights.len() >= FEWEST_OF_MEDIAN);
+            heights.map_or(f64::NAN, |heights| upper_median(&mut heights.clone()))
+        };
+        (*first..=*last).map(|at| ((at as f64 + 0.5) * step_m, median(at))).collect()
     }
 }

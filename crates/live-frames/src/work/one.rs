@@ -12,6 +12,10 @@ use crate::stages::UnwrapStage;
 use crate::work::ranges::{Channel, Rules, flag_unsure};
 use crate::work::rows::{Chunk, MOST_CHUNKS, for_each_chunk};
 
+/// Pixels that go through one step after the other together, in whole rows: they stay near in between, and memory comes in faster by
+/// long stretches of few planes than by single rows of many.
+const TOGETHER: usize = 8192;
+
 /// What is kept from frame to frame.
 #[derive(Debug)]
 pub(crate) struct One {
@@ -46,8 +50,11 @@ impl One {
         let (width, rows) = (rules.width, frame.height().div_ceil(MOST_CHUNKS));
         for_each_chunk(frame, rows, std::iter::repeat(()), |chunk, ()| {
             let Chunk { first_row, range, sigma, amplitude, flags, points } = chunk;
-            for (row, start) in (*first_row..).zip((0..range.len()).step_by(width)) {
-                let (own, here) = (start..start + width, row * width..(row + 1) * width);
+            let together = (TOGETHER / width).max(1) * width;
+            for start in (0..range.len()).step_by(together) {
+                let own = start..(start + together).min(range.len());
+                let (row, first) = (*first_row + start / width, *first_row * width);
+                let here = first + own.start..first + own.end;
                 let flags = &mut flags[own.clone()];
                 let given = &complex.flags.as_slice()[here.clone()];
                 flag_unsure(given, &confidence[here.clone()], rules.minimum_confidence, flags);

@@ -179,7 +179,7 @@ pub struct Influence {
     /// Variance of the pose over what its residuals tell: 1, and up to 2 where the target's planes are means with frames that were
     /// brought to it. What all of its nodes together err by has moved these frames instead of leaving residuals, and is still
     /// the target's own.
-    pub(crate) kept: f64,
+    pub kept: f64,
     /// Logarithm of the scale of the source's ranges against the target's, if pose and scale are unknown, its variance by the
     /// random part of the residuals, and its derivative by the coefficients.
     scale: (f64, f64, Field),

@@ -36,11 +36,8 @@ impl FrameAligner {
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
     ) -> Result<(IcpResult, Option<Influence>)> {
-        let mut result = self.registered(Frames { source, target }, guess)?;
+        let result = self.registered(Frames { source, target }, guess)?;
         let influence = target.influence(source, &result.target_from_source, &mut self.sightings, &mut self.scratch);
-        if let Some(influence) = &influence {
-            result.covariance *= influence.kept;
-        }
         Ok((result, influence))
     }
 }

@@ -176,6 +176,10 @@ fn of_degrees(values: &[f64; DEGREE + 1]) -> Field {
 pub struct Influence {
     /// Derivative of the registered pose by the coefficients.
     pub pose: ByField,
+    /// Variance of the pose over what its residuals tell: 1, and up to 2 where the target's planes are means with frames that were
+    /// brought to it. What all of its nodes together err by has moved these frames instead of leaving residuals, and is still
+    /// the target's own.
+    pub kept: f64,
     /// Logarithm of the scale of the source's ranges against the target's, if pose and scale are unknown, its variance by the
     /// random part of the residuals, and its derivative by the coefficients.
     scale: (f64, f64, Field),
@@ -203,6 +207,8 @@ pub(crate) struct Sighting {
     /// In standard deviations of the nodes' noise.
     residual: f64,
     variance: f64,
+    /// Of the target's plane, as a share of that, what frames brought to it have taken off.
+    taken: f64,
     /// Derivatives by the pose, by the field and by the logarithm of the scale of the source's ranges, and the residual, metre; 0 in what is left.
     row: [f64; ROW],
     /// Whether the sample before is its neighbour.
@@ -253,15 +259,18 @@ impl OrganisedFrame {
         let (of_source, of_target) = (source.field(partner.source as usize), self.field(partner.node as usize));
         let variance = f64::from(partner.variance);
         // Planes that have learnt from other frames lie between the errors of these.
-        let learnt = self.measured.get(partner.node as usize).map_or(0.0, |measured| plane[3] - f64::from(*measured));
-        let residual = f64::from(partner.residual) + learnt;
+        let node = partner.node as usize;
+        let now = [plane[3], f64::from(self.sigma[node])];
+        let [distance, sigma] = self.measured.get(node).map_or(now, |measured| measured.map(f64::from));
+        let residual = f64::from(partner.residual) + now[0] - distance;
+        let taken = (sigma * sigma - now[1] * now[1]) / variance;
         let mut row = [0.0; ROW];
         row[..FIELD].copy_from_slice(frame.derivative(&point, &normal).as_slice());
         for (value, (source, target)) in row[FIELD..SCALE].iter_mut().zip(of_source.iter().zip(of_target)) {
             *value = source * by_scale - target * plane[3];
         }
         (row[SCALE], row[RESIDUAL]) = (by_scale, residual);
-        Sighting { residual: residual / variance.sqrt(), variance, row, follows }
+        Sighting { residual: residual / variance.sqrt(), variance, taken, row, follows }
     }
 
     /// Relative change of a node's depth by each coefficient.
@@ -308,6 +317,8 @@ fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<
     let (scale, scale_right) = (sums[SCALE][SCALE], sums[SCALE][RESIDUAL]);
     let scale_cross = Vector6::from_fn(|r, _| sums[r][SCALE]);
     let scale_field = Field::from_fn(|r, _| sums[FIELD + r][SCALE]);
+    let weight: f64 = sightings.iter().map(|s| 1.0 / s.variance).sum();
+    let taken: f64 = sightings.iter().map(|s| s.taken / s.variance).sum();
     let factor = matrix.cholesky()?;
     let pose = -factor.solve(&cross);
     let followed = factor.solve(&scale_cross);
@@ -319,5 +330,6 @@ fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<
         right: right + pose.transpose() * gradient,
         scale: (logarithm, 1.0 / scale, scale_by_field),
         pose: to_tangent * pose,
+        kept: 1.0 + taken / weight,
     })
 }

@@ -40,8 +40,8 @@ pub struct OrganisedFrame {
     is_whole: bool,
     /// Plane of each node: unit normal away from the camera, distance; NaN where there is none.
     pub(crate) planes: Vec<[f32; 4]>,
-    /// Distances of the planes before others were absorbed, where any may have been.
-    pub(crate) measured: Vec<f32>,
+    /// Distances of the planes and their standard deviations before others were absorbed, where any may have been.
+    pub(crate) measured: Vec<[f32; 2]>,
     /// Standard deviation of the distance, metre.
     pub(crate) sigma: Vec<f32>,
     misfit: Vec<f32>,
@@ -173,7 +173,7 @@ impl OrganisedFrame {
             place: self.place.clone(),
             is_whole: self.is_whole,
             planes: self.planes.clone(),
-            measured: self.planes.iter().map(|plane| plane[3]).collect(),
+            measured: self.planes.iter().zip(&self.sigma).map(|(plane, sigma)| [plane[3], *sigma]).collect(),
             sigma: self.sigma.clone(),
             misfit: Vec::new(),
             noise: self.noise,

@@ -80,7 +80,12 @@ impl Measured {
 
     /// The part of the covariance that frames registered with the same keyframe do not share.
     pub(crate) fn own(&self) -> Uncertain {
-        Uncertain { covariance: self.pose.covariance * 0.5, ..self.pose }
+        Uncertain { covariance: self.whole() * 0.5, ..self.pose }
+    }
+
+    /// The random covariance with all that the keyframe errs by: what residuals tell decides on what is determined alone.
+    fn whole(&self) -> Matrix6<f64> {
+        self.pose.covariance * self.influence.map_or(1.0, |influence| influence.kept)
     }
 
     /// Derivative of the pose by the field that is assumed.
@@ -90,12 +95,12 @@ impl Measured {
 
     /// As an observation between the keyframe and the camera.
     pub(crate) fn relation(&self) -> Relation {
-        Relation { random: self.pose, by_field: self.by_field() }
+        Relation { random: Uncertain { covariance: self.whole(), ..self.pose }, by_field: self.by_field() }
     }
 
     /// The part that they share: the keyframe's own noise.
     pub(crate) fn shared(&self) -> Matrix6<f64> {
-        self.pose.covariance * 0.5
+        self.whole() * 0.5
     }
 }
 

@@ -5,7 +5,8 @@ CLOUD is the `cloud.ply` that `rangecam fuse` wrote. Large planes are found in i
 fused points within TOLERANCE and ANGLE, connected over cells of CELL. On each, planes are fitted within RADIUS about every third point,
 so that what bends a whole wall is no scatter, and what neighbours have in common neither. Prints for each plane, and for all together, the
 robust scatter in millimetres, robust and root mean square scatter over the deviations that are stated of the points' own errors
-(`sigma_own`; 1: as stated), and robust over those with what points have in common (`sigma`). With the `cloud.ply` that was fused as RESULT, also the robust
+(`sigma_own`; 1: as stated), and robust over those with what points have in common (`sigma`); then the robust scatter about the whole plane over
+`sigma`: what points have in common is alike within RADIUS, and differs over a wall. With the `cloud.ply` that was fused as RESULT, also the robust
 scatter of the points of single frames about planes of their own, fitted within RADIUS on the same walls: how thick a section is in one frame.
 """
 import re
@@ -143,10 +144,10 @@ def scatter_of_frames(part, points, frames):
     return np.array(distances)
 
 
-def line(name, distances, standardised):
+def line(name, distances, standardised, whole):
     own, all_sources = standardised.T
     square = np.sqrt(np.mean(own**2))
-    over = f"over stated {robust(own):.2f} (root mean square {square:.2f}; with all sources {robust(all_sources):.2f})"
+    over = f"over stated {robust(own):.2f} (root mean square {square:.2f}; with all sources {robust(all_sources):.2f}; about the whole plane {robust(whole):.2f})"
     return f"{name}: {1e3 * robust(distances):.2f} mm, {over}"
 
 
@@ -160,11 +161,12 @@ def main(path, result=None):
             continue
         of_frames = scatter_of_frames(points[part], *given) if given else np.array([])
         centre = ", ".join(f"{value:.2f}" for value in points[part].mean(0))
-        found.append((f"{len(part)} fused points about ({centre})", distances, standardised, of_frames))
-    found.append(("all", *(np.concatenate([plane[at] for plane in found]) for at in (1, 2, 3))))
-    for name, distances, standardised, of_frames in found:
+        whole = off_plane(points[part], 1 / sigma[part, 0] ** 2) / sigma[part, 1]
+        found.append((f"{len(part)} fused points about ({centre})", distances, standardised, whole, of_frames))
+    found.append(("all", *(np.concatenate([plane[at] for plane in found]) for at in (1, 2, 3, 4))))
+    for name, distances, standardised, whole, of_frames in found:
         single = f"; single frames {1e3 * robust(of_frames):.2f} mm" if len(of_frames) else ""
-        print(line(name, distances, standardised) + single)
+        print(line(name, distances, standardised, whole) + single)
 
 
 if __name__ == "__main__":

@@ -191,7 +191,7 @@ pub struct Fused {
 
 impl Fused {
     /// Whether points scatter within frames by clearly less than is stated of their noise, so that standard deviations may be too large.
-    pub fn states_too_much(&self) -> bool {
+    pub fn noise_is_overstated(&self) -> bool {
         is_smaller(self.noise_within_frames)
     }
 }

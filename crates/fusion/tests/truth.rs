@@ -68,7 +68,7 @@ fn where_frames_disagree_beyond_what_is_stated_sigma_says_so() {
         let [understated, overstated] = [0.5, 2.0].map(|factor| fused(&Stated(&survey, factor)));
         let larger = [&honest, &understated, &overstated].map(|fused| fused.noise_factor);
         assert!(larger[0] == 1.0 && (3.4..4.6).contains(&larger[1]) && larger[2] == 1.0, "{larger:?}");
-        let smaller = [&honest, &understated, &overstated].map(Fused::states_too_much);
+        let smaller = [&honest, &understated, &overstated].map(Fused::noise_is_overstated);
         assert_eq!(smaller, [false, false, true]);
         for surfel in &understated.surfels {
             let Some((height, _)) = survey.scene.above(&surfel.position, &surfel.normal) else { continue };

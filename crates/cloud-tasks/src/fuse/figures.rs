@@ -254,13 +254,13 @@ impl Section {
         for (along, height) in places {
             heights.entry((along / step_m).floor() as i64).or_default().push(height);
         }
-        let (Some((first, _)), Some((last, _))) = (heights.first_key_value(), heights.last_key_value()) else {
+        let (Some((&first, _)), Some((&last, _))) = (heights.first_key_value(), heights.last_key_value()) else {
             return Vec::new();
         };
-        let median = |at: i64| {
-            let heights = heights.get(&at).filter(|heights| heights.len() >= FEWEST_OF_MEDIAN);
-            heights.map_or(f64::NAN, |heights| upper_median(&mut heights.clone()))
+        let mut median = |at: i64| {
+            let heights = heights.get_mut(&at).filter(|heights| heights.len() >= FEWEST_OF_MEDIAN);
+            heights.map_or(f64::NAN, |heights| upper_median(heights))
         };
-        (*first..=*last).map(|at| ((at as f64 + 0.5) * step_m, median(at))).collect()
+        (first..=last).map(|at| ((at as f64 + 0.5) * step_m, median(at))).collect()
     }
 }

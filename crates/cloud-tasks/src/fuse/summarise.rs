@@ -225,7 +225,7 @@ fn findings(summary: &mut FuseSummary, fused: &Fused, is_depth_camera: bool) {
             fused.noise_factor.sqrt()
         ));
     }
-    if fused.states_too_much() {
+    if fused.noise_is_overstated() {
         summary.findings.push(format!(
             "Within frames, points scatter by {:.1} times what is stated of their noise: it is stated too large, and standard deviations with it, \
              unless the camera smooths its images.",

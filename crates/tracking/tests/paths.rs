@@ -66,6 +66,31 @@ fn sixty_frames_stay_within_millimetres() {
     assert!(tracker.keyframes() > 1 && tracker.keyframes() < 20, "{}", tracker.keyframes());
 }
 
+/// Somebody who walks to and fro across the room, seen by a camera that sways in place: frame `k` of 40, played forth and back.
+fn with_somebody(k: usize) -> (Vec<[f64; 3]>, Vec<f32>) {
+    let at = if k % 78 < 40 { k % 78 } else { 78 - k % 78 };
+    let (along, swing) = (-1.3 + 0.065 * at as f64, 0.08 * (at as f64 / 9.0).sin());
+    let mut scene = Scene::furnished();
+    scene.boxes.push(common::Cuboid::new([0.1, along - 0.35, 0.0], [0.5, along + 0.35, 1.8]));
+    let pose = look_at([-1.7 + 0.3 * swing, swing, 1.4], [1.5, 2.0 * swing, 0.9]);
+    common::frame_with_mixed_pixels(&scene, &camera(), &pose, 70_000 + k as u64)
+}
+
+#[test]
+fn where_somebody_walks_a_camera_in_one_place_soon_makes_no_more_keyframes() {
+    let mut tracker = tracker(TrackerOptions::default());
+    let mut keyframes = Vec::new();
+    for k in 0..3 * 78 {
+        let (points, sigma) = with_somebody(k);
+        let pose = tracker.track(k as f64 / HERTZ, &points, Some(&sigma), None).unwrap();
+        assert!(pose.state.has_pose(), "{k}: {:?}", pose.state);
+        if k % 78 == 77 {
+            keyframes.push(tracker.keyframes());
+        }
+    }
+    assert!(keyframes[0] > 3 && keyframes[2] == keyframes[1], "{keyframes:?}");
+}
+
 #[test]
 fn the_way_back_is_tracked_from_the_keyframes_of_the_way_there() {
     let mut tracker = tracker(TrackerOptions::default());

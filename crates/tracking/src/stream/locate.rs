@@ -152,6 +152,27 @@ impl Tracker {
         })
     }
 
+    /// The keyframe that should see most of the frame, where it helps as a new one would: things that move contradict the reference, and
+    /// without it a camera that stays in one room would make keyframes for ever.
+    fn with_known(
+        &mut self,
+        last: &Last,
+        prediction: &Prediction,
+        helps: impl Fn(&Measured) -> bool,
+    ) -> Option<Measured> {
+        if last.lost_frames > 0 {
+            return None;
+        }
+        let (reference, pose) = (last.keyframe, &prediction.own.pose);
+        let &(overlap, k) = self.keyframes.candidates(&self.current, reference, pose, |k| k != reference).first()?;
+        // With less in common, the next frames would leave it again.
+        if overlap < self.options.keyframe_overlap {
+            return None;
+        }
+        let guess = self.keyframes.graph.relative(k, reference) * pose;
+        self.try_keyframe(k, &guess).ok().filter(helps)
+    }
+
     /// The current frame near its predicted pose: from the reference, or from keyframes that should see the same.
     pub(crate) fn near(&mut self, last: &Last, prediction: &Prediction) -> Result<Measured, LossReason> {
         let reference = last.keyframe;
@@ -164,6 +185,9 @@ impl Tracker {
         let radius = self.current.radius_m();
         let doubtful = !first.as_ref().is_ok_and(Measured::agrees);
         let helps = |measured: &Measured| measured.is_firm(radius) || doubtful && measured.is_sound();
+        if let Some(measured) = self.with_known(last, prediction, helps) {
+            return Ok(measured);
+        }
         if let Some(measured) = self.with_previous(last, prediction, helps) {
             return Ok(measured);
         }

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use crate::motion_model::motion::MotionPrior;
 use crate::motion_model::velocity::Velocity;
+use pose_graph::is_likely;
 use projective_registration::ByField;
 use rigid_pose::Uncertain;
 use rigid_pose::pose_difference;
@@ -60,6 +61,12 @@ pub(crate) struct Prediction {
 }
 
 impl Prediction {
+    /// Whether a measured pose lies as near to the predicted one as the deviations of both let expect; never where the prediction is but
+    /// a start.
+    pub(crate) fn bears_out(&self, measured: &Uncertain) -> bool {
+        self.grounds != Grounds::Nothing && measured.mahalanobis_squared(&self.own).is_some_and(is_likely)
+    }
+
     /// The prediction corrected by a measurement. Where the camera moved in another way than predicted, the prediction
     /// counts for less.
     pub(crate) fn corrected(&self, measured: &Uncertain) -> Option<(Uncertain, Option<Velocity>)> {

@@ -188,7 +188,11 @@ impl Tracker {
         if let Some(measured) = self.with_known(last, prediction, helps) {
             return Ok(measured);
         }
-        if let Some(measured) = self.with_previous(last, prediction, helps) {
+        // Where the velocity bears the reference out, what contradicts moves by itself, and draws the frame before along.
+        let borne_out = first.as_ref().is_ok_and(|measured| measured.determined && prediction.bears_out(&measured.own()));
+        let from_previous = prediction.seen_from(&last.own.pose.inverse());
+        let follows = |measured: &Measured| !borne_out || from_previous.bears_out(&measured.own());
+        if let Some(measured) = self.with_previous(last, prediction, |measured| helps(measured) && follows(measured)) {
             return Ok(measured);
         }
         let usable = |measured: &Measured| measured.determined || prediction.grounds != Grounds::Nothing;

@@ -53,6 +53,23 @@ fn a_camera_at_rest_stays_where_it_is() {
     }
 }
 
+#[test]
+fn a_person_who_walks_by_does_not_draw_the_camera_along() {
+    let sequence = Sequence { width: 640, height: 480, rays: 1, ..Sequence::default() };
+    let stages = Stages { tracking: Some(TrackerOptions::default()), ..stages(100) };
+    let mut processor = Processor::new(&sequence.camera(), &sequence.calibration(), stages, Limits::default()).unwrap();
+    for number in 0..8 {
+        let frame = sequence.frame(number);
+        let truth = frame.truth.world_from_camera;
+        processor.place_first(truth).unwrap();
+        let found = processor.process(frame.raw.samples(), number as f64 * INTERVAL_S).unwrap();
+        let pose = found.pose.unwrap();
+        let error = (truth.inverse() * pose.world_from_camera).translation.vector.norm();
+        // Registered with the frame before, the fifth one goes 60 mm with the person.
+        assert!(error < 4e-3, "{number}: {error}");
+    }
+}
+
 /// Heights of the map's points over the walls of the room, with their standard deviations.
 fn heights(map: &SurfaceMap) -> Vec<[f64; 2]> {
     let cloud = map.cloud();

@@ -126,17 +126,23 @@ impl<T: Copy + Into<f64>> NodeRow<'_, T> {
         let bin = if BIN == 0 { self.grid.bin } else { BIN };
         let mut sums = [[0.0_f32; PIXELS]; 4];
         let ones = [1.0_f32; PIXELS];
+        // Apart from the comparisons, which would be done in double precision otherwise.
+        let mut depths = [0.0_f32; PIXELS];
         for line in 0..bin {
             let start = (self.row * bin + line) * self.width + first * bin;
             let points = &self.points[start..start + pixels];
             let sigma = self.sigma.map_or(&ones[..pixels], |sigma| &sigma[start..start + pixels]);
             let below = line as f32 - (bin as f32 - 1.0) / 2.0;
             for k in 0..pixels {
+                let z: f64 = points[k][2].into();
+                depths[k] = -(z as f32);
+            }
+            for k in 0..pixels {
                 // What single precision cannot hold is infinite, and fails, as NaN does.
-                let (z, s): (f64, f32) = (points[k][2].into(), sigma[k]);
-                let depth = -z as f32;
+                let (depth, s) = (depths[k], sigma[k]);
                 let is_known = (depth > LEAST_DEPTH_M as f32) & (depth < LARGEST_DEPTH_M as f32);
-                let is_valid = is_known & (s > 0.0) & (s < f32::INFINITY);
+                // Below infinity: compared with that itself, classes of numbers would be told apart by their bits.
+                let is_valid = is_known & (s > 0.0) & (s <= f32::MAX);
                 let one = if is_valid { 1.0 } else { 0.0 };
                 let depth = if is_valid { depth } else { f32::INFINITY };
                 let s = if is_valid { s } else { 0.0 };

@@ -78,15 +78,19 @@ impl PlaneRow<'_> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, first: usize) {
         let start = self.row * self.grid.cols + first;
-        let mut is_whole = true;
+        let (mut is_whole, mut is_empty) = (true, !self.is_whole);
         for row in 0..if self.is_whole { 0 } else { 2 * HALF + 1 } {
             let shares = &self.share[start + row * self.grid.cols - HALF * self.grid.cols - HALF..][..N + 2 * HALF];
             for k in 0..N + 2 * HALF {
                 is_whole &= shares[k] >= 1.0;
+                is_empty &= shares[k] <= 0.0;
             }
         }
         if is_whole {
             self.fit::<N, true>(first);
+        } else if is_empty {
+            // Planes are none already.
+            self.sigma[first..first + N].fill(f32::NAN);
         } else {
             self.fit::<N, false>(first);
         }

@@ -160,7 +160,7 @@ impl WithLocate for Part<'_, '_> {
 
     #[inline(always)]
     fn run<L: Locate>(mut self, locate: L) {
-        let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS] };
+        let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS], each: [[0.0; LANES]; SUMS] };
         for (blocks, cells) in self.blocks.chunks(sums::CHUNK).zip(self.cell_of.chunks(sums::CHUNK)) {
             let mut totals = [[0.0; BLOCK]; sums::SUMS];
             for (blocks, cells) in blocks.chunks(AT_ONCE).zip(cells.chunks(AT_ONCE)) {
@@ -177,6 +177,8 @@ impl WithLocate for Part<'_, '_> {
 struct Run {
     cell: u16,
     lanes: [[f32; BLOCK]; SUMS],
+    /// What each node adds; filled anew each time.
+    each: [[f32; LANES]; SUMS],
 }
 
 impl Part<'_, '_> {
@@ -185,7 +187,7 @@ impl Part<'_, '_> {
         let along_target = derivatives(&pairs.lever, &pairs.normal);
         let along_source = derivatives(&pairs.lever, &pairs.source_normal);
         sums::add(totals, pairs, &along_target);
-        let mut lanes = [[0.0_f32; LANES]; SUMS];
+        let lanes = &mut run.each;
         let (mut score, mut half_slope) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         for l in 0..LANES {
             score[l] = pairs.weight[l] * pairs.residual[l];
@@ -208,7 +210,7 @@ impl Part<'_, '_> {
         while at < cells.len() {
             let same = cells[at..].iter().take_while(|cell_of| cell_of.iter().all(|cell| *cell == run.cell)).count();
             // Blocks that follow each other in one cell are summed up in the registers.
-            for (sum, lane) in run.lanes.iter_mut().zip(&lanes) {
+            for (sum, lane) in run.lanes.iter_mut().zip(&run.each) {
                 let mut own = *sum;
                 for block in &lane.as_chunks::<BLOCK>().0[at..at + same] {
                     for l in 0..BLOCK {
@@ -219,7 +221,7 @@ impl Part<'_, '_> {
             }
             at += same;
             if at < cells.len() {
-                self.sort(run, &lanes, at * BLOCK, &cells[at], &pairs.weight);
+                self.sort(run, at * BLOCK, &cells[at], &pairs.weight);
                 at += 1;
             }
         }
@@ -227,14 +229,7 @@ impl Part<'_, '_> {
 
     /// Adds the lanes of a block that lies in several cells or begins another one, from `first` on, each to its cell.
     #[inline(always)]
-    fn sort(
-        &mut self,
-        run: &mut Run,
-        lanes: &[[f32; LANES]; SUMS],
-        first: usize,
-        cell_of: &[u16; BLOCK],
-        weight: &[f32; LANES],
-    ) {
+    fn sort(&mut self, run: &mut Run, first: usize, cell_of: &[u16; BLOCK], weight: &[f32; LANES]) {
         let mut waiting = [false; BLOCK];
         for l in 0..BLOCK {
             waiting[l] = weight[first + l] > 0.0;
@@ -250,7 +245,7 @@ impl Part<'_, '_> {
                 share[l] = if cell_of[l] == cell { 1.0 } else { 0.0 };
                 waiting[l] &= cell_of[l] != cell;
             }
-            for (sum, lane) in run.lanes.iter_mut().zip(lanes) {
+            for (sum, lane) in run.lanes.iter_mut().zip(&run.each) {
                 for l in 0..BLOCK {
                     sum[l] += share[l] * lane[first + l];
                 }

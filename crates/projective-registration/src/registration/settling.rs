@@ -14,7 +14,7 @@ use icp_registration::quality::SMALL_STEP;
 /// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
 /// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
 const COARSE_FRACTION: f64 = 1.0;
-/// Steps before which the reach of the kernel is set.
+/// Steps before which the reach of the kernel is set. Where a step on a quarter of the nodes is short before that, the rest follow on all.
 const NARROWINGS: usize = 3;
 /// Steps after which it is first seen whether the pose has got anywhere, and then after twice as many as before: where nodes
 /// change back and forth between planes, steps never become short. A power of 2; it decides on time alone.
@@ -48,7 +48,7 @@ impl FrameAligner {
                 *narrowings -= 1;
             }
             let (step, frame) = self.step(track, frames, blocks, 0.0)?;
-            if *narrowings > 0 {
+            if *narrowings > 0 && track.over_sigma > over_sigma {
                 continue;
             }
             let tolerance = SMALL_STEP * frame.radius_m;

@@ -42,13 +42,14 @@ impl FrameAligner {
         narrowings: &mut usize,
     ) -> Result<StopReason> {
         let (mut steps, mut way, mut most) = (0, Vector6::zeros(), 1);
+        let are_some = blocks.len() < frames.all_blocks().len();
         while track.iterations < self.options.max_iterations {
             if *narrowings > 0 {
                 self.rescale(track, frames, *narrowings == NARROWINGS);
                 *narrowings -= 1;
             }
             let (step, frame) = self.step(track, frames, blocks, 0.0)?;
-            if *narrowings > 0 && track.over_sigma > over_sigma {
+            if *narrowings > 0 && !(are_some && track.over_sigma <= over_sigma) {
                 continue;
             }
             let tolerance = SMALL_STEP * frame.radius_m;

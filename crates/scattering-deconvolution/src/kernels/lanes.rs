@@ -17,11 +17,19 @@ pub(crate) fn sum_rows(rows: &[f32], weights: &[[f32; 3]], width: usize, sums: &
     let mut sums = [first, second, &mut third[..width]];
     let (mut begun, done) = (false, rows.len() / (4 * width));
     for (rows, weights) in rows.chunks_exact(4 * width).zip(weights.as_chunks::<4>().0) {
-        if begun { add_four::<false>(rows, weights, &mut sums) } else { add_four::<true>(rows, weights, &mut sums) }
+        if begun {
+            add_four::<false>(rows, weights, &mut sums)
+        } else {
+            add_four::<true>(rows, weights, &mut sums)
+        }
         begun = true;
     }
     for (row, weights) in rows.chunks_exact(width).zip(weights).skip(4 * done) {
-        if begun { add_one::<false>(row, weights, &mut sums) } else { add_one::<true>(row, weights, &mut sums) }
+        if begun {
+            add_one::<false>(row, weights, &mut sums)
+        } else {
+            add_one::<true>(row, weights, &mut sums)
+        }
         begun = true;
     }
 }

@@ -189,7 +189,8 @@ impl Tracker {
             return Ok(measured);
         }
         // Where the velocity bears the reference out, what contradicts moves by itself, and draws the frame before along.
-        let borne_out = first.as_ref().is_ok_and(|measured| measured.determined && prediction.bears_out(&measured.own()));
+        let borne_out =
+            first.as_ref().is_ok_and(|measured| measured.determined && prediction.bears_out(&measured.own()));
         let from_previous = prediction.seen_from(&last.own.pose.inverse());
         let follows = |measured: &Measured| !borne_out || from_previous.bears_out(&measured.own());
         if let Some(measured) = self.with_previous(last, prediction, |measured| helps(measured) && follows(measured)) {

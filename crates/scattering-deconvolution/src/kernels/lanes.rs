@@ -1,78 +1,49 @@
 //! Inner loops over pixels, compiled for the widest registers that the machine has. Products and sums stay separate
 //! operations in a fixed order, so that all machines give the same bits.
-// Only what is inlined is compiled for wide registers; loops over lines read as their formulas.
-#![allow(clippy::inline_always, clippy::needless_range_loop)]
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use fourier_transforms::num_complex::Complex;
 
 /// Values that are worked side by side.
 pub(crate) const LANES: usize = 8;
 
-/// Three weighted sums of rows that lie one after the other, each `width` long; one after the other in `sums`, whatever was there. Four
-/// rows are taken at a time, to write the sums less often.
+/// Three weighted sums of rows that lie one after the other, each `width` long; one after the other in `sums`. Four rows
+/// are taken at a time, to write the sums less often.
 #[inline(always)]
 pub(crate) fn sum_rows(rows: &[f32], weights: &[[f32; 3]], width: usize, sums: &mut [f32]) {
-    let (first, rest) = sums.split_at_mut(width);
-    let (second, third) = rest.split_at_mut(width);
-    let mut sums = [first, second, &mut third[..width]];
-    let (mut begun, done) = (false, rows.len() / (4 * width));
-    for (rows, weights) in rows.chunks_exact(4 * width).zip(weights.as_chunks::<4>().0) {
-        if begun {
-            add_four::<false>(rows, weights, &mut sums)
-        } else {
-            add_four::<true>(rows, weights, &mut sums)
+    sums.fill(0.0);
+    for (rows, weights) in rows.chunks(4 * width).zip(weights.chunks(4)) {
+        for (tap, sums) in sums.chunks_exact_mut(width).enumerate() {
+            if let (&[a, b, c, d], true) = (weights, rows.len() == 4 * width) {
+                add_four(rows, [a[tap], b[tap], c[tap], d[tap]], sums);
+            } else {
+                for (row, weights) in rows.chunks_exact(width).zip(weights) {
+                    for (sum, value) in sums.iter_mut().zip(row) {
+                        *sum += weights[tap] * value;
+                    }
+                }
+            }
         }
-        begun = true;
-    }
-    for (row, weights) in rows.chunks_exact(width).zip(weights).skip(4 * done) {
-        if begun {
-            add_one::<false>(row, weights, &mut sums)
-        } else {
-            add_one::<true>(row, weights, &mut sums)
-        }
-        begun = true;
     }
 }
 
-/// Adds four rows to three lines, each by its own weights; the first ones take the place of what was there.
+/// Adds four weighted rows to a line.
 #[inline(always)]
-fn add_four<const FIRST: bool>(rows: &[f32], weights: &[[f32; 3]; 4], [x, y, z]: &mut [&mut [f32]; 3]) {
-    let width = x.len();
-    let [a, b, c, d] = [0, 1, 2, 3].map(|row| &rows[row * width..][..width]);
-    let (y, z) = (&mut y[..width], &mut z[..width]);
-    for i in 0..width {
-        let sum = |tap: usize| {
-            let [first, second, third, fourth] = weights.map(|weights| weights[tap]);
-            (first * a[i] + second * b[i]) + (third * c[i] + fourth * d[i])
-        };
-        x[i] = if FIRST { sum(0) } else { x[i] + sum(0) };
-        y[i] = if FIRST { sum(1) } else { y[i] + sum(1) };
-        z[i] = if FIRST { sum(2) } else { z[i] + sum(2) };
-    }
-}
-
-/// The same with one row.
-#[inline(always)]
-fn add_one<const FIRST: bool>(row: &[f32], weights: &[f32; 3], [x, y, z]: &mut [&mut [f32]; 3]) {
-    let width = x.len();
-    let (row, y, z) = (&row[..width], &mut y[..width], &mut z[..width]);
-    for i in 0..width {
-        let part = weights.map(|weight| weight * row[i]);
-        x[i] = if FIRST { part[0] } else { x[i] + part[0] };
-        y[i] = if FIRST { part[1] } else { y[i] + part[1] };
-        z[i] = if FIRST { part[2] } else { z[i] + part[2] };
+fn add_four(rows: &[f32], [a, b, c, d]: [f32; 4], sums: &mut [f32]) {
+    let width = sums.len();
+    let (upper, lower) = rows.split_at(2 * width);
+    let ((first, second), (third, fourth)) = (upper.split_at(width), lower.split_at(width));
+    for (sum, (((first, second), third), fourth)) in
+        sums.iter_mut().zip(first.iter().zip(second).zip(third).zip(fourth))
+    {
+        *sum += (a * first + b * second) + (c * third + d * fourth);
     }
 }
 
 /// Sum of up to three lines, as many as there are.
 #[inline(always)]
 pub(crate) fn add_lines(lines: [Option<&[f32]>; 3], sum: &mut [f32]) {
-    if let [Some(first), Some(second), Some(third)] = lines {
-        for (sum, ((first, second), third)) in sum.iter_mut().zip(first.iter().zip(second).zip(third)) {
-            *sum = first + second + third;
-        }
-        return;
-    }
     sum.fill(0.0);
     for line in lines.into_iter().flatten() {
         for (sum, value) in sum.iter_mut().zip(line) {
@@ -140,18 +111,14 @@ pub(crate) fn add_weighted(row: &mut [f32], [a, b, c]: [f32; 3], lines: [&[f32];
 #[inline(always)]
 pub(crate) fn band_along(matrix: &[Complex<f32>], band: &[Vec<f32>; 5], out: &mut [Complex<f32>]) {
     let columns = band[0].len();
-    let inner = 2..columns.saturating_sub(2).max(2);
-    let weights = band.each_ref().map(|weights| weights.get(inner.clone()).unwrap_or_default());
+    out.fill(Complex::new(0.0, 0.0));
     for (out, row) in out.chunks_exact_mut(columns).zip(matrix.chunks_exact(columns)) {
-        for column in (0..columns).filter(|column| !inner.contains(column)) {
-            let values = (0..5).filter_map(|k| Some(row.get((column + k).checked_sub(2)?)? * band[k][column]));
-            out[column] = values.fold(Complex::new(0.0, 0.0), |sum, value| sum + value);
-        }
-        let Some(out) = out.get_mut(inner.clone()) else { continue };
-        let count = out.len();
-        let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|k| (&row[k..k + count], &weights[k][..count]));
-        for i in 0..count {
-            out[i] = a.0[i] * a.1[i] + b.0[i] * b.1[i] + c.0[i] * c.1[i] + d.0[i] * d.1[i] + e.0[i] * e.1[i];
+        for (diagonal, weights) in band.iter().enumerate() {
+            let skipped = 2_usize.saturating_sub(diagonal).min(columns);
+            let values = row.iter().skip(diagonal.saturating_sub(2));
+            for ((out, weight), value) in out[skipped..].iter_mut().zip(&weights[skipped..]).zip(values) {
+                *out += value * weight;
+            }
         }
     }
 }
@@ -159,22 +126,13 @@ pub(crate) fn band_along(matrix: &[Complex<f32>], band: &[Vec<f32>; 5], out: &mu
 /// The same for the columns of a matrix.
 #[inline(always)]
 pub(crate) fn band_across(matrix: &[Complex<f32>], band: &[Vec<f32>; 5], columns: usize, out: &mut [Complex<f32>]) {
+    out.fill(Complex::new(0.0, 0.0));
     for (row, out) in out.chunks_exact_mut(columns).enumerate() {
-        let source = |diagonal: usize| {
-            let start = (row + diagonal).checked_sub(2)? * columns;
-            Some((matrix.get(start..start + columns)?, band[diagonal][row]))
-        };
-        let sources = [0, 1, 2, 3, 4].map(source);
-        if let [Some(a), Some(b), Some(c), Some(d), Some(e)] = sources {
-            for (i, out) in out.iter_mut().enumerate() {
-                *out = a.0[i] * a.1 + b.0[i] * b.1 + c.0[i] * c.1 + d.0[i] * d.1 + e.0[i] * e.1;
-            }
-            continue;
-        }
-        out.fill(Complex::new(0.0, 0.0));
-        for (source, weight) in sources.into_iter().flatten() {
+        for (diagonal, weights) in band.iter().enumerate() {
+            let source = (row + diagonal).checked_sub(2).map(|source| source * columns);
+            let Some(source) = source.and_then(|start| matrix.get(start..start + columns)) else { continue };
             for (out, value) in out.iter_mut().zip(source) {
-                *out += value * weight;
+                *out += value * weights[row];
             }
         }
     }

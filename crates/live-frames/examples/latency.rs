@@ -15,7 +15,9 @@ mod cpu_clock;
 use std::time::Instant;
 
 use common::{INTERVAL_S, Sequence};
-use live_frames::{Limits, Processor, Stages};
+#[cfg(feature = "tracking")]
+use live_frames::tracking::{nalgebra::Isometry3, rigid_pose::Uncertain};
+use live_frames::{Limits, ProcessedFrame, Processor, Stages};
 
 /// Frames that are simulated; they are played forth and back, so that motion has no jump.
 const SIMULATED: usize = 40;
@@ -27,7 +29,11 @@ fn main() {
     let beside = next(0) > 0;
     let modulation_hz = if frequencies == 1 { vec![30e6] } else { vec![80e6, 60e6] };
     let sequence = Sequence { width, height, modulation_hz, rays: 1, ..Sequence::default() };
-    let raw: Vec<_> = (0..SIMULATED).map(|number| sequence.frame(number).raw).collect();
+    let shown = |number: usize| {
+        let frame = sequence.frame(number);
+        (frame.raw, frame.truth.world_from_camera)
+    };
+    let simulated: Vec<_> = (0..SIMULATED).map(shown).collect();
     let mut processor =
         Processor::new(&sequence.camera(), &sequence.calibration(), stages(tracking), Limits::default()).unwrap();
     let mut every = stages(false);
@@ -39,10 +45,11 @@ fn main() {
     let mut of_processor = Vec::with_capacity(frames);
     let mut quickest = vec![f64::INFINITY; 2 * SIMULATED - 2];
     let (mut whole, mut checks, mut failed, mut memory) = (0, 0, 0.0, [0; 2]);
-    let mut lost = 0;
+    let (mut lost, mut errors) = (0, Vec::with_capacity(frames));
     for number in 0..frames {
         let at = number % (2 * SIMULATED - 2);
-        let samples = raw[if at < SIMULATED { at } else { 2 * SIMULATED - 2 - at }].samples();
+        let (raw, truth) = &simulated[if at < SIMULATED { at } else { 2 * SIMULATED - 2 - at }];
+        let samples = raw.samples();
         let (begin_ms, begin) = (processor_time_ms(), Instant::now());
         processor.process(samples, number as f64 * INTERVAL_S).unwrap();
         milliseconds.push(1e3 * begin.elapsed().as_secs_f64());
@@ -59,6 +66,14 @@ fn main() {
         checks += usize::from(frame.counts.checked);
         failed += frame.counts.failed as f64 / frame.counts.used.max(1) as f64;
         lost += usize::from(is_lost(frame));
+        if std::env::var("DBG").is_ok() {
+            if let Some([a, b]) = pose_errors(frame, &(simulated[0].1.inverse() * truth)) {
+                if a > 4e-4 {
+                    eprintln!("{number} {:.1} mm {b:.0}", 1e3 * a.sqrt());
+                }
+            }
+        }
+        errors.extend(pose_errors(frame, &(simulated[0].1.inverse() * truth)));
         if number == 100.min(frames - 1) {
             memory[0] = resident_kib();
         }
@@ -89,6 +104,16 @@ fn main() {
         row("by the clock, full tree on every frame", of_tree);
     }
     tell_map(&processor);
+    if !errors.is_empty() {
+        let mean = |part: usize| errors.iter().map(|error| error[part]).sum::<f64>() / errors.len() as f64;
+        let largest = errors.iter().map(|error| error[0]).fold(0.0, f64::max).sqrt();
+        println!(
+            "poses off by {:.1} mm (root mean square; largest {:.1}), squared error over covariance {:.1} (6 expected)",
+            1e3 * mean(0).sqrt(),
+            1e3 * largest,
+            mean(1)
+        );
+    }
     println!(
         "resident at frame 100 and at the end: {:.1}, {:.1} MiB",
         memory[0] as f64 / 1024.0,
@@ -123,13 +148,27 @@ fn stages(_: bool) -> Stages {
 }
 
 #[cfg(feature = "tracking")]
-fn is_lost(frame: &live_frames::ProcessedFrame) -> bool {
+fn is_lost(frame: &ProcessedFrame) -> bool {
     frame.pose.is_some_and(|pose| !pose.state.has_pose())
 }
 
 #[cfg(not(feature = "tracking"))]
-fn is_lost(_: &live_frames::ProcessedFrame) -> bool {
+fn is_lost(_: &ProcessedFrame) -> bool {
     false
+}
+
+/// Squared distance of a frame's pose from the true one in the frame of the first, m², and the squared error over its covariance.
+#[cfg(feature = "tracking")]
+fn pose_errors(frame: &ProcessedFrame, truth: &Isometry3<f64>) -> Option<[f64; 2]> {
+    let pose = frame.pose.filter(|pose| pose.state.has_pose() && frame.number > 0)?;
+    let off = truth.inverse() * pose.world_from_camera;
+    let found = Uncertain { pose: pose.world_from_camera, covariance: pose.covariance };
+    Some([off.translation.vector.norm_squared(), found.mahalanobis_squared(&Uncertain::exact(*truth))?])
+}
+
+#[cfg(not(feature = "tracking"))]
+fn pose_errors<T>(_: &ProcessedFrame, _: &T) -> Option<[f64; 2]> {
+    None
 }
 
 /// Memory of this process, where the system tells; 0 elsewhere.

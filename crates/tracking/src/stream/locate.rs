@@ -158,7 +158,7 @@ impl Tracker {
         &mut self,
         last: &Last,
         prediction: &Prediction,
-        helps: impl Fn(&Measured) -> bool,
+        helps: impl Fn(&Measured, &Prediction) -> bool,
     ) -> Option<Measured> {
         if last.lost_frames > 0 {
             return None;
@@ -169,8 +169,8 @@ impl Tracker {
         if overlap < self.options.keyframe_overlap {
             return None;
         }
-        let guess = self.keyframes.graph.relative(k, reference) * pose;
-        self.try_keyframe(k, &guess).ok().filter(helps)
+        let predicted = prediction.seen_from(&self.keyframes.graph.relative(k, reference));
+        self.try_keyframe(k, &predicted.own.pose).ok().filter(|measured| helps(measured, &predicted))
     }
 
     /// The current frame near its predicted pose: from the reference, or from keyframes that should see the same.
@@ -185,15 +185,15 @@ impl Tracker {
         let radius = self.current.radius_m();
         let doubtful = !first.as_ref().is_ok_and(Measured::agrees);
         let helps = |measured: &Measured| measured.is_firm(radius) || doubtful && measured.is_sound();
-        if let Some(measured) = self.with_known(last, prediction, helps) {
-            return Ok(measured);
-        }
-        // Where the velocity bears the reference out, what contradicts moves by itself, and draws the frame before along.
+        // Where the velocity bears the reference out, what contradicts moves by itself, and would draw another pose along.
         let borne_out =
             first.as_ref().is_ok_and(|measured| measured.determined && prediction.bears_out(&measured.own()));
+        let follows = |measured: &Measured, predicted: &Prediction| !borne_out || predicted.bears_out(&measured.own());
+        if let Some(measured) = self.with_known(last, prediction, |m, predicted| helps(m) && follows(m, predicted)) {
+            return Ok(measured);
+        }
         let from_previous = prediction.seen_from(&last.own.pose.inverse());
-        let follows = |measured: &Measured| !borne_out || from_previous.bears_out(&measured.own());
-        if let Some(measured) = self.with_previous(last, prediction, |measured| helps(measured) && follows(measured)) {
+        if let Some(measured) = self.with_previous(last, prediction, |m| helps(m) && follows(m, &from_previous)) {
             return Ok(measured);
         }
         let usable = |measured: &Measured| measured.determined || prediction.grounds != Grounds::Nothing;
@@ -207,9 +207,10 @@ impl Tracker {
         let one = self.is_beside() && last.lost_frames > 0;
         let (passed, tried) = if one { (last.lost_frames % CANDIDATES, 1) } else { (0, CANDIDATES) };
         for (_, k) in candidates.into_iter().skip(passed).take(tried) {
-            let guess = self.keyframes.graph.relative(k, reference) * prediction.own.pose;
-            if let Ok(measured) = self.try_keyframe(k, &guess)
+            let predicted = prediction.seen_from(&self.keyframes.graph.relative(k, reference));
+            if let Ok(measured) = self.try_keyframe(k, &predicted.own.pose)
                 && measured.is_sound()
+                && follows(&measured, &predicted)
             {
                 return Ok(measured);
             }

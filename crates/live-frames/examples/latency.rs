@@ -66,13 +66,6 @@ fn main() {
         checks += usize::from(frame.counts.checked);
         failed += frame.counts.failed as f64 / frame.counts.used.max(1) as f64;
         lost += usize::from(is_lost(frame));
-        if std::env::var("DBG").is_ok() {
-            if let Some([a, b]) = pose_errors(frame, &(simulated[0].1.inverse() * truth)) {
-                if a > 4e-4 {
-                    eprintln!("{number} {:.1} mm {b:.0}", 1e3 * a.sqrt());
-                }
-            }
-        }
         errors.extend(pose_errors(frame, &(simulated[0].1.inverse() * truth)));
         if number == 100.min(frames - 1) {
             memory[0] = resident_kib();

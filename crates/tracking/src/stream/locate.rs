@@ -177,18 +177,20 @@ impl Tracker {
     pub(crate) fn near(&mut self, last: &Last, prediction: &Prediction) -> Result<Measured, LossReason> {
         let reference = last.keyframe;
         let first = self.try_keyframe(reference, &prediction.own.pose);
-        if let Ok(measured) = first
-            && measured.is_firm(self.current.radius_m())
-        {
-            return Ok(measured);
+        let firm = first.as_ref().is_ok_and(|measured| measured.is_firm(self.current.radius_m()));
+        let borne_out =
+            first.as_ref().is_ok_and(|measured| measured.determined && prediction.bears_out(&measured.own()));
+        if firm && (borne_out || prediction.grounds == Grounds::Nothing) {
+            return first;
         }
         let radius = self.current.radius_m();
         let doubtful = !first.as_ref().is_ok_and(Measured::agrees);
         let helps = |measured: &Measured| measured.is_firm(radius) || doubtful && measured.is_sound();
-        // Where the velocity bears the reference out, what contradicts moves by itself, and would draw another pose along.
-        let borne_out =
-            first.as_ref().is_ok_and(|measured| measured.determined && prediction.bears_out(&measured.own()));
-        let follows = |measured: &Measured, predicted: &Prediction| !borne_out || predicted.bears_out(&measured.own());
+        // Where the velocity bears the reference out, what contradicts moves by itself, and would draw another pose along; where it does not,
+        // the reference may have been drawn along.
+        let must_follow = firm || borne_out;
+        let follows =
+            |measured: &Measured, predicted: &Prediction| !must_follow || predicted.bears_out(&measured.own());
         if let Some(measured) = self.with_known(last, prediction, |m, predicted| helps(m) && follows(m, predicted)) {
             return Ok(measured);
         }

@@ -1,9 +1,10 @@
 //! How long frames take, one after the other without a pause, and whether memory stays the same.
 //!
 //! `RAYON_NUM_THREADS=1 cargo run --release -p live-frames --all-features --example latency [frames columns rows frequencies
-//! tracking beside]`, by default 10000 frames of 640 x 480 pixels at one frequency, without tracking. `tracking` 1: with poses and a map that is kept. `beside` 1: each
-//! frame goes also through a processor that solves every frame by the full tree, in turn, so that what else the machine does slows both. A moving camera in a room in
-//! which things move; 40 simulated frames are played forth and back. Times are those of the clock and those of the processor, over all threads.
+//! tracking beside first anew]`, by default 10000 frames of 640 x 480 pixels at one frequency, without tracking. `tracking` 1: with poses and a map that is kept. `beside`
+//! 1: each frame goes also through a processor that solves every frame by the full tree, in turn, so that what else the machine does slows both. A moving camera in a room
+//! in which things move; 40 simulated frames are played forth and back, from the `first` one on, by default 0. `anew` 1: with other noise in each pass, as the same noise,
+//! seen again and again, does not go down as poses state; that takes ten times as long. Times are those of the clock and those of the processor, over all threads.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/mod.rs"]
@@ -26,14 +27,14 @@ fn main() {
     let mut numbers = std::env::args().skip(1).filter_map(|argument| argument.parse::<usize>().ok());
     let mut next = |default: usize| numbers.next().unwrap_or(default);
     let (frames, width, height, frequencies, tracking) = (next(10_000), next(640), next(480), next(1), next(0) > 0);
-    let beside = next(0) > 0;
+    let (beside, first, anew) = (next(0) > 0, next(0), next(0) > 0);
     let modulation_hz = if frequencies == 1 { vec![30e6] } else { vec![80e6, 60e6] };
-    let sequence = Sequence { width, height, modulation_hz, rays: 1, ..Sequence::default() };
-    let shown = |number: usize| {
-        let frame = sequence.frame(number);
+    let sequence = Sequence { width, height, modulation_hz, rays: 1, first, ..Sequence::default() };
+    let shown = |number: usize, pass: usize| {
+        let frame = sequence.frame_with_noise(number, (1000 * (1 + pass) + number) as u64);
         (frame.raw, frame.truth.world_from_camera)
     };
-    let simulated: Vec<_> = (0..SIMULATED).map(shown).collect();
+    let mut simulated: Vec<_> = (0..SIMULATED).map(|number| shown(number, 0)).collect();
     let mut processor =
         Processor::new(&sequence.camera(), &sequence.calibration(), stages(tracking), Limits::default()).unwrap();
     let mut every = stages(false);
@@ -48,6 +49,9 @@ fn main() {
     let (mut lost, mut errors) = (0, Vec::with_capacity(frames));
     for number in 0..frames {
         let at = number % (2 * SIMULATED - 2);
+        if anew && at == 0 && number > 0 {
+            simulated = (0..SIMULATED).map(|of_pass| shown(of_pass, number)).collect();
+        }
         let (raw, truth) = &simulated[if at < SIMULATED { at } else { 2 * SIMULATED - 2 - at }];
         let samples = raw.samples();
         let (begin_ms, begin) = (processor_time_ms(), Instant::now());

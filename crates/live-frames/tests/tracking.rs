@@ -53,20 +53,33 @@ fn a_camera_at_rest_stays_where_it_is() {
     }
 }
 
-#[test]
-fn a_person_who_walks_by_does_not_draw_the_camera_along() {
-    let sequence = Sequence { width: 640, height: 480, rays: 1, ..Sequence::default() };
+/// Largest distance of poses from the true ones, metre, in frames of a stream in which a person walks by.
+fn farthest_off(sequence: &Sequence, frames: usize) -> f64 {
     let stages = Stages { tracking: Some(TrackerOptions::default()), ..stages(100) };
     let mut processor = Processor::new(&sequence.camera(), &sequence.calibration(), stages, Limits::default()).unwrap();
-    for number in 0..8 {
+    let mut farthest: f64 = 0.0;
+    for number in 0..frames {
         let frame = sequence.frame(number);
         let truth = frame.truth.world_from_camera;
         processor.place_first(truth).unwrap();
-        let found = processor.process(frame.raw.samples(), number as f64 * INTERVAL_S).unwrap();
-        let pose = found.pose.unwrap();
-        let error = (truth.inverse() * pose.world_from_camera).translation.vector.norm();
-        // Registered with the frame before, the fifth one goes 60 mm with the person.
-        assert!(error < 4e-3, "{number}: {error}");
+        let pose = processor.process(frame.raw.samples(), number as f64 * INTERVAL_S).unwrap().pose.unwrap();
+        if pose.state.has_pose() {
+            farthest = farthest.max((truth.inverse() * pose.world_from_camera).translation.vector.norm());
+        }
+    }
+    farthest
+}
+
+#[test]
+fn a_person_who_walks_by_does_not_draw_the_camera_along() {
+    // Registered with the frame before, the fifth one goes 60 mm with the person.
+    let off = farthest_off(&Sequence { width: 640, height: 480, rays: 1, ..Sequence::default() }, 8);
+    assert!(off < 4e-3, "{off}");
+    // With larger pixels the person weighs more: 65 mm a frame from the fifth on, and 60 mm a frame from the second on where they are nearer. A quarter of one such step is
+    // what the room leaves open.
+    for first in [0, 90] {
+        let off = farthest_off(&Sequence { width: 320, height: 240, rays: 1, first, ..Sequence::default() }, 14);
+        assert!(off < 15e-3, "{first}: {off}");
     }
 }
 

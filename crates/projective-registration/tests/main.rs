@@ -14,6 +14,7 @@ mod depth_frames;
 mod frames_cloud;
 mod frames_input;
 mod frames_real;
+mod movers;
 mod pairs;
 mod prepared;
 mod sr4000;

@@ -23,6 +23,8 @@ pub struct Sequence {
     pub errors: bool,
     /// Nothing moves.
     pub still: bool,
+    /// Frames after the beginning of all motions that the first one is.
+    pub first: usize,
 }
 
 impl Default for Sequence {
@@ -36,6 +38,7 @@ impl Default for Sequence {
             rays: 2,
             errors: true,
             still: false,
+            first: 0,
         }
     }
 }
@@ -135,9 +138,14 @@ impl Sequence {
 
     /// One frame.
     pub fn frame(&self, number: usize) -> SimulatedFrame {
-        let spec = self.spec(if self.still { 0.0 } else { number as f64 * INTERVAL_S });
+        self.frame_with_noise(number, 1000 + number as u64)
+    }
+
+    /// The same with the noise of a seed.
+    pub fn frame_with_noise(&self, number: usize, seed: u64) -> SimulatedFrame {
+        let spec = self.spec(if self.still { 0.0 } else { (self.first + number) as f64 * INTERVAL_S });
         let simulator = Simulator::new(&spec).unwrap();
-        simulator.frame(&simulator.station(0).unwrap(), 0, 1000 + number as u64).unwrap()
+        simulator.frame(&simulator.station(0).unwrap(), 0, seed).unwrap()
     }
 }
 

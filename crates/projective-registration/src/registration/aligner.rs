@@ -49,6 +49,7 @@ pub struct FrameAligner {
     chunks: Vec<[f64; SUMS]>,
     pub(crate) scratch: Vec<u32>,
     pub(crate) cells: Vec<Cell>,
+    pub(crate) means: Vec<[f32; 2]>,
     pub(crate) sightings: Vec<Sighting>,
 }
 
@@ -62,6 +63,7 @@ impl FrameAligner {
             chunks: Vec::new(),
             scratch: Vec::with_capacity(2 * SAMPLE),
             cells: Vec::new(),
+            means: Vec::new(),
             sightings: Vec::new(),
         })
     }
@@ -72,6 +74,13 @@ impl FrameAligner {
     }
 
     pub(crate) fn registered(&mut self, frames: Frames<'_>, guess: &Isometry3<f64>) -> Result<IcpResult> {
+        let track = Self::start(frames, guess)?;
+        let first = self.follow_levels(track.clone(), frames);
+        if self.options.search { self.searched(first, &track, frames) } else { first.map(|(_, result)| result) }
+    }
+
+    /// A pose that has not moved yet.
+    pub(crate) fn start(frames: Frames<'_>, guess: &Isometry3<f64>) -> Result<Track> {
         require_pose("the guess", guess)?;
         for (what, frame) in [("the source frame", frames.source), ("the target frame", frames.target)] {
             if frame.len() < FEWEST_PAIRS {
@@ -80,9 +89,7 @@ impl FrameAligner {
         }
         let rules = Rules { extra_variance: 0.0, widening: 1.0 };
         let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
-        let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
-        let first = self.follow_levels(track.clone(), frames);
-        if self.options.search { self.searched(first, &track, frames) } else { first.map(|(_, result)| result) }
+        Ok(Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY })
     }
 
     /// The whole way from the guess.

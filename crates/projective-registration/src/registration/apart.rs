@@ -36,8 +36,30 @@ impl FrameAligner {
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
     ) -> Result<(IcpResult, Option<Influence>)> {
-        let result = self.registered(Frames { source, target }, guess)?;
+        let frames = Frames { source, target };
+        let result = self.registered(frames, guess)?;
+        Ok(self.with_influence(result, frames))
+    }
+
+    /// As [`FrameAligner::align_apart`], from a guess that is known as well as a registration knows it: the last steps alone, which hold
+    /// on to what lies within noise there. Something large that moves by itself draws no pose to where it would stand still, as where
+    /// all that is in reach takes part first. Nothing is searched for.
+    pub fn align_near(
+        &mut self,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<(IcpResult, Option<Influence>)> {
+        let rest = self.without_strays(source, target, guess);
+        let frames = Frames { source: &rest, target };
+        let track = Self::start(frames, guess)?;
+        let (_, result) = self.end(track, frames)?;
+        Ok(self.with_influence(result, frames))
+    }
+
+    fn with_influence(&mut self, result: IcpResult, frames: Frames<'_>) -> (IcpResult, Option<Influence>) {
+        let Frames { source, target } = frames;
         let influence = target.influence(source, &result.target_from_source, &mut self.sightings, &mut self.scratch);
-        Ok((result, influence))
+        (result, influence)
     }
 }

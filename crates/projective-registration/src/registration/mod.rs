@@ -3,6 +3,7 @@
 pub(crate) mod aligner;
 pub(crate) mod apart;
 pub(crate) mod consistency;
+pub(crate) mod misfit;
 pub(crate) mod outlines;
 pub(crate) mod places;
 pub(crate) mod products;

@@ -2,33 +2,27 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use crate::motion_model::motion::diagonal;
 use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
+use crate::stream::claim::{Claim, reachable};
 use crate::stream::keyframes::CANDIDATES;
+use crate::stream::register::{register, register_expected};
 use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
 use pose_graph::{Relation, is_likely};
 use projective_registration::icp_registration::quality::OPEN;
-use projective_registration::{
-    Agreement, ByField, Error as FrameError, Field, FrameAligner, Influence, OrganisedFrame,
-};
-use rigid_pose::{InputError, Uncertain, step_pose, symmetrised};
+use projective_registration::{Agreement, ByField, Influence};
+use rigid_pose::{Uncertain, symmetrised};
 
 /// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
 const BY_VELOCITY: f64 = 0.25;
 /// Where a frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard deviation at the
 /// radius of the frame exceeds this, metre: half of the reach within which registrations of a room come back.
 const CARRIED_SIGMA_M: f64 = 0.1;
-/// Smallest fraction of the planes that the keyframe can judge that must agree: what frames of different places reach by chance.
-const FEWEST_CONSENTING: f64 = 0.6;
 /// Fraction of the frame that a pose found against expectation must agree by.
 const LEAST_OVERLAP: f64 = 0.5;
 /// Planes it must share: three make a corner, and corners look alike.
 const LEAST_PLANES: usize = 4;
-/// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, or go where its velocity is not known,
-/// as a standard deviation: what is carried elsewhere is carried farther.
-const JUMP: f64 = 0.05;
 
 /// A registration that passed its tests.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +43,7 @@ pub(crate) struct Measured {
 
 impl Measured {
     /// Whether the geometry determines all motions well, and nothing speaks against the pose.
-    fn is_firm(&self, radius_m: f64) -> bool {
+    pub(crate) fn is_firm(&self, radius_m: f64) -> bool {
         self.is_sound() && self.pose.sigma_at(radius_m) <= OPEN * radius_m
     }
 
@@ -112,12 +106,14 @@ pub(crate) struct Fix {
     pub(crate) velocity: Option<Velocity>,
     /// Whether it lies where the camera can have gone since the frame before.
     pub(crate) expected: bool,
+    /// Whether the registration by itself lies where the velocity, or a measurement of the motion, expects the camera.
+    pub(crate) borne_out: bool,
 }
 
 impl Fix {
     /// Where nothing was expected.
     pub(crate) fn unexpected(measured: &Measured) -> Self {
-        Self { own: measured.own(), velocity: None, expected: false }
+        Self { own: measured.own(), velocity: None, expected: false, borne_out: false }
     }
 }
 
@@ -126,6 +122,13 @@ impl Tracker {
     pub(crate) fn try_keyframe(&mut self, k: usize, guess: &Isometry3<f64>) -> Result<Measured, LossReason> {
         let target = &self.keyframes.list[k].frame;
         register(&mut self.aligner, &self.current, target, guess, &self.keyframes.graph.field)
+            .map(|measured| Measured { keyframe: k, ..measured })
+    }
+
+    /// Registers the current frame with keyframe `k`, from which it is expected somewhere.
+    fn try_expected(&mut self, k: usize, prediction: &Prediction) -> Result<Measured, LossReason> {
+        let (target, field) = (&self.keyframes.list[k].frame, &self.keyframes.graph.field);
+        register_expected(&mut self.aligner, &self.current, target, prediction, field)
             .map(|measured| Measured { keyframe: k, ..measured })
     }
 
@@ -141,9 +144,8 @@ impl Tracker {
         if last.lost_frames > 0 || exact {
             return None;
         }
-        let guess = last.own.pose.inverse() * prediction.own.pose;
-        let field = &self.keyframes.graph.field;
-        let measured = register(&mut self.aligner, &self.current, &self.previous, &guess, field).ok()?;
+        let (expected, field) = (prediction.seen_from(&last.own.pose.inverse()), &self.keyframes.graph.field);
+        let measured = register_expected(&mut self.aligner, &self.current, &self.previous, &expected, field).ok()?;
         helps(&measured).then(|| {
             let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
             let relation = Relation { random: total, by_field: last.by_field };
@@ -152,75 +154,50 @@ impl Tracker {
         })
     }
 
-    /// The keyframe that should see most of the frame, where it helps as a new one would: things that move contradict the reference, and
-    /// without it a camera that stays in one room would make keyframes for ever.
-    fn with_known(
-        &mut self,
-        last: &Last,
-        prediction: &Prediction,
-        helps: impl Fn(&Measured, &Prediction) -> bool,
-    ) -> Option<Measured> {
-        if last.lost_frames > 0 {
-            return None;
-        }
-        let (reference, pose) = (last.keyframe, &prediction.own.pose);
-        let &(overlap, k) = self.keyframes.candidates(&self.current, reference, pose, |k| k != reference).first()?;
-        // With less in common, the next frames would leave it again.
-        if overlap < self.options.keyframe_overlap {
-            return None;
-        }
-        let predicted = prediction.seen_from(&self.keyframes.graph.relative(k, reference));
-        self.try_keyframe(k, &predicted.own.pose).ok().filter(|measured| helps(measured, &predicted))
+    /// The current frame and the keyframe of a candidate, where they are brought together as the claim of the reference asks.
+    fn try_candidate(&mut self, k: usize, last: &Last, prediction: &Prediction, claim: &Claim) -> Option<Measured> {
+        let between = self.keyframes.graph.relative(k, last.keyframe);
+        let found = self.try_expected(k, &prediction.seen_from(&between)).ok();
+        found.filter(|measured| claim.is_met_by(measured, &between))
     }
 
     /// The current frame near its predicted pose: from the reference, or from keyframes that should see the same.
     pub(crate) fn near(&mut self, last: &Last, prediction: &Prediction) -> Result<Measured, LossReason> {
         let reference = last.keyframe;
-        let first = self.try_keyframe(reference, &prediction.own.pose);
-        let firm = first.as_ref().is_ok_and(|measured| measured.is_firm(self.current.radius_m()));
-        let borne_out =
-            first.as_ref().is_ok_and(|measured| measured.determined && prediction.bears_out(&measured.own()));
-        if firm && (borne_out || prediction.grounds == Grounds::Nothing) {
-            return first;
-        }
-        let radius = self.current.radius_m();
-        let doubtful = !first.as_ref().is_ok_and(Measured::agrees);
-        let helps = |measured: &Measured| measured.is_firm(radius) || doubtful && measured.is_sound();
-        // Where the velocity bears the reference out, what contradicts moves by itself, and would draw another pose along; where it does not,
-        // the reference may have been drawn along.
-        let must_follow = firm || borne_out;
-        let follows =
-            |measured: &Measured, predicted: &Prediction| !must_follow || predicted.bears_out(&measured.own());
-        if let Some(measured) = self.with_known(last, prediction, |m, predicted| helps(m) && follows(m, predicted)) {
-            return Ok(measured);
-        }
-        let from_previous = prediction.seen_from(&last.own.pose.inverse());
-        if let Some(measured) = self.with_previous(last, prediction, |m| helps(m) && follows(m, &from_previous)) {
-            return Ok(measured);
-        }
-        let usable = |measured: &Measured| measured.determined || prediction.grounds != Grounds::Nothing;
-        if first.as_ref().is_ok_and(|measured| usable(measured) && measured.agrees()) {
+        let first = self.try_expected(reference, prediction);
+        let claim = Claim::of(first.as_ref().ok(), prediction, self.current.radius_m());
+        if claim.is_settled {
             return first;
         }
         let others = |k: usize| k != reference;
-        let pose = &prediction.own.pose;
-        let candidates = self.keyframes.candidates(&self.current, reference, pose, others);
+        let candidates = self.keyframes.candidates(&self.current, reference, &prediction.own.pose, others);
+        // One that is there goes before a new one: things that move contradict the reference, and a camera that stays in one room would
+        // make keyframes for ever. With less in common, the next frames would leave it again.
+        let shared = |overlap: f64| last.lost_frames == 0 && overlap >= self.options.keyframe_overlap;
+        let known = candidates.first().filter(|(overlap, _)| shared(*overlap)).map(|&(_, k)| k);
+        let of_known = known.map(|k| self.try_candidate(k, last, prediction, &claim));
+        if let Some(Some(measured)) = of_known.filter(|found| found.is_some_and(|m| claim.is_helped_by(&m))) {
+            return Ok(measured);
+        }
+        let from_previous = last.own.pose.inverse();
+        let helps = |measured: &Measured| claim.is_helped_by(measured) && claim.is_met_by(measured, &from_previous);
+        if let Some(measured) = self.with_previous(last, prediction, helps) {
+            return Ok(measured);
+        }
+        if first.as_ref().is_ok_and(|measured| claim.is_usable(measured) && measured.agrees()) {
+            return first;
+        }
         // In a stream that does not wait, a lost frame tries one of them, in turn.
         let one = self.is_beside() && last.lost_frames > 0;
         let (passed, tried) = if one { (last.lost_frames % CANDIDATES, 1) } else { (0, CANDIDATES) };
-        for (_, k) in candidates.into_iter().skip(passed).take(tried) {
-            let predicted = prediction.seen_from(&self.keyframes.graph.relative(k, reference));
-            if let Ok(measured) = self.try_keyframe(k, &predicted.own.pose)
-                && measured.is_sound()
-                && follows(&measured, &predicted)
-            {
-                return Ok(measured);
-            }
-        }
-        match first {
-            Ok(measured) if usable(&measured) => first,
-            Ok(_) => Err(LossReason::Undetermined),
-            Err(reason) => Err(reason),
+        let sound = candidates.into_iter().skip(passed).take(tried).find_map(|(_, k)| {
+            let again = of_known.filter(|_| known == Some(k));
+            again.unwrap_or_else(|| self.try_candidate(k, last, prediction, &claim)).filter(Measured::is_sound)
+        });
+        match (sound, first) {
+            (Some(measured), _) => Ok(measured),
+            (None, Ok(measured)) if !claim.is_usable(&measured) => Err(LossReason::Undetermined),
+            (None, first) => first,
         }
     }
 
@@ -254,23 +231,21 @@ impl Tracker {
             if !measured.determined {
                 return Err(LossReason::Undetermined);
             }
-            let fix = Fix { own: half, velocity: None, expected };
+            let fix = Fix { own: half, velocity: None, expected, borne_out: false };
             return if expected || self.stands_alone(measured) { Ok(fix) } else { Err(LossReason::LargeResiduals) };
         }
         let (own, velocity) = prediction.corrected(&half).ok_or(LossReason::Undetermined)?;
         let carried = own.sigma_at(self.current.radius_m()) <= Self::carried_sigma_m(prediction.grounds);
-        let fix = Fix { own, velocity, expected: true };
+        let fix = Fix { own, velocity, expected: true, borne_out: prediction.bears_out(&half) };
         if carried || measured.determined { Ok(fix) } else { Err(LossReason::Undetermined) }
     }
 
     /// Whether a pose lies where the camera can have gone since the frame before.
     fn expects(&self, own: &Uncertain, prediction: &Prediction, lost_frames: usize) -> bool {
         let radius = self.current.radius_m();
-        let ungrounded = prediction.grounds == Grounds::Nothing;
-        let known = if ungrounded { Matrix6::zeros() } else { prediction.own.covariance };
-        let covariance = known + diagonal([(JUMP * radius).powi(2), JUMP * JUMP]);
-        let reachable = Uncertain { covariance, ..prediction.own };
-        let relied_on = !ungrounded && prediction.own.sigma_at(radius) <= Self::carried_sigma_m(prediction.grounds);
+        let grounded = prediction.grounds != Grounds::Nothing;
+        let relied_on = grounded && prediction.own.sigma_at(radius) <= Self::carried_sigma_m(prediction.grounds);
+        let reachable = reachable(prediction, radius);
         (lost_frames == 0 || relied_on) && own.mahalanobis_squared(&reachable).is_some_and(is_likely)
     }
 
@@ -290,34 +265,4 @@ impl Tracker {
             && self.current.agreement(keyframe, &pose.inverse(), Agreement::NODES).consent() >= Agreement::LEAST_CONSENT
             && keyframe.shared_planes(&self.current, pose, Agreement::NODES) >= LEAST_PLANES
     }
-}
-
-/// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.
-pub(crate) fn register(
-    aligner: &mut FrameAligner,
-    source: &OrganisedFrame,
-    target: &OrganisedFrame,
-    guess: &Isometry3<f64>,
-    field: &Field,
-) -> Result<Measured, LossReason> {
-    let (result, influence) = aligner.align_apart(source, target, guess).map_err(|error| match error {
-        FrameError::Input(InputError::TooFewPoints { .. }) => LossReason::TooFewPoints,
-        FrameError::Input(InputError::TooFewCorrespondences { .. }) => LossReason::TooLittleOverlap,
-        _ => LossReason::NotConverged,
-    })?;
-    let aligned = result.target_from_source;
-    let by_field = influence.map_or_else(ByField::zeros, |influence| influence.pose);
-    let pose = Uncertain { pose: step_pose(&aligned, &(-by_field * field)), covariance: result.covariance };
-    let agreement = target.agreement(source, &aligned, Agreement::NODES);
-    if agreement.consent() < FEWEST_CONSENTING {
-        return Err(LossReason::LargeResiduals);
-    }
-    if agreement.overlap() < Agreement::LEAST_OVERLAP {
-        return Err(LossReason::TooLittleOverlap);
-    }
-    if !rigid_pose::is_finite(&pose.pose) || pose.covariance.cholesky().is_none() {
-        return Err(LossReason::NotConverged);
-    }
-    let determined = result.degenerate.is_empty();
-    Ok(Measured { keyframe: 0, pose, aligned, influence, determined, agreement, rms_m: result.rms_m })
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::map::surfaces::SurfaceMap;
 use crate::stream::keyframes::Keyframes;
-use crate::stream::locate::register;
+use crate::stream::register::register;
 use crate::stream::tracker::Tracker;
 use pose_graph::{Edge, Relation};
 use projective_registration::OrganisedFrame;

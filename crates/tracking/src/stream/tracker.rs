@@ -255,7 +255,8 @@ impl Tracker {
             self.placed(&measured, last, prediction)
         });
         let found = match &near {
-            Ok((measured, _)) if measured.agrees() => return near,
+            // Where the velocity bears it out, what contradicts moves by itself.
+            Ok((measured, fix)) if measured.agrees() || fix.borne_out => return near,
             // What contradicts is still better than nothing, unless some other keyframe fits.
             Ok(_) => {
                 let ranked = self.ranked();

@@ -39,7 +39,7 @@ const KNOWN: &[(Use, &[&str])] = &[
             "self-calibration/src/methods/reference.rs",
             "self-calibration/src/outliers/control_test.rs",
             "tracking/src/motion_model/motion.rs",
-            "tracking/src/stream/locate.rs",
+            "tracking/src/stream/register.rs",
         ],
     ),
     (

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::fit::{LineRules, VarianceFit, fit_variance};
 use super::neighbours::shared_noise;
 use super::repeats::{AllRepeats, Repeats, Running, Thinning};
-use super::steadiness::{Alike, VALUES_PER_TASK};
+use super::steadiness::{Alike, Steadiness, VALUES_PER_TASK};
 use super::{Frames, NoiseFitOptions, RepeatedRanges, steadiness};
 use crate::{Error, Result};
 
@@ -128,13 +128,10 @@ fn fit_as<S: Frames<RangeFrame>>(
         let variance = fit.slope * scale.received(amplitude, range_m).powi(-2) + fit.level;
         (variance < largest_variance).then_some(variance)
     };
-    let mut factors = Vec::with_capacity(stations.len());
-    for (station, own) in stations.iter().zip(observed) {
-        factors.push(own.frame_factors(station, variance)?);
-    }
-    for (steadiness, factors) in fit.steadiness.iter_mut().zip(factors) {
-        steadiness.frame_factors = factors;
-        if let Err(error) = steadiness.require_alike(options) {
+    let frames = fit.steadiness.iter().map(|station| station.frames).sum();
+    for ((station, own), steadiness) in stations.iter().zip(observed).zip(&mut fit.steadiness) {
+        own.compare_frames(station, variance, steadiness)?;
+        if let Err(error) = steadiness.require_alike(options, frames) {
             return Ok(Err(error));
         }
     }
@@ -282,28 +279,29 @@ impl Observed {
         self.values.iter().filter_map(move |value| value.repeats(scale))
     }
 
-    /// Scatter of each frame over what noise explains, which gives a pixel of this amplitude and range a variance.
-    fn frame_factors<S: Frames<RangeFrame>>(
+    /// Scatter of each frame over what noise explains, which gives a pixel of this amplitude and range a variance, for `steadiness`.
+    fn compare_frames<S: Frames<RangeFrame>>(
         &self,
         station: &RepeatedRanges<S>,
         variance: impl Fn(f64, f64) -> Option<f64>,
-    ) -> Result<Vec<f64>, S::Error> {
+        steadiness: &mut Steadiness,
+    ) -> Result<(), S::Error> {
         let frames = station.frames.count();
         let expected = |value: &Kept| {
             let (range_m, own) = (value.range.regressor, value.range.variance);
             Some([range_m, own, variance(value.amplitude[0], range_m)?])
         };
         let alike = Alike::new(frames, self.values.iter().map(expected));
-        let (mut factors, interval_m) = (Vec::with_capacity(frames), station.interval_m);
+        let interval_m = station.interval_m;
+        steadiness.frame_values = alike.values();
         station.each(&mut |frame| {
             let ranges = frame.range.as_slice();
-            factors.push(alike.factor(|place| {
+            steadiness.frame_factors.push(alike.factor(|place| {
                 let value = &self.values[place];
                 beside(f64::from(ranges[value.index]), value.first_m, interval_m)
             }));
             Ok(())
-        })?;
-        Ok(factors)
+        })
     }
 }
 

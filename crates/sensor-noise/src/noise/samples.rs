@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::fit::{LineRules, VarianceFit, fit_variance};
 use super::repeats::{AllRepeats, Repeats, Running, Thinning};
-use super::steadiness::{self, Alike, VALUES_PER_TASK};
+use super::steadiness::{self, Alike, Steadiness, VALUES_PER_TASK};
 use super::{Frames, NoiseFitOptions, RepeatedSamples, SampleUnits};
 use crate::{Error, Result};
 
@@ -64,9 +64,10 @@ pub fn estimate_sample_noise<S: Frames<RawFrame>>(
     let least = [0.0, quantisation_sigma * quantisation_sigma];
     let rules = LineRules { least, sloped: !without_light, parts: PARTS, largest_variance: f64::INFINITY, every };
     let mut fit = fit_variance(repeats, &rules, options)?;
+    let frames = fit.steadiness.iter().map(|station| station.frames).sum();
     for ((station, own), steadiness) in stations.iter().zip(&observed).zip(&mut fit.steadiness) {
-        steadiness.frame_factors = own.frame_factors(station, units, [fit.slope, fit.level])?;
-        steadiness.require_alike(options)?;
+        own.compare_frames(station, units, [fit.slope, fit.level], steadiness)?;
+        steadiness.require_alike(options, frames)?;
     }
     let noise = NoiseModel { shot_variance_per_unit: fit.slope, dark_sigma: fit.level.sqrt() };
     Ok(SampleNoiseEstimate { noise, quantisation_sigma, fit, without_light })
@@ -148,22 +149,23 @@ impl Observed {
         Ok((all, own))
     }
 
-    /// Scatter of each frame over what noise with this line explains.
-    fn frame_factors<S: Frames<RawFrame>>(
+    /// Scatter of each frame over what noise with this line explains, for `steadiness`.
+    fn compare_frames<S: Frames<RawFrame>>(
         &self,
         station: &RepeatedSamples<S>,
         units: &SampleUnits,
         line: [f64; 2],
-    ) -> Result<Vec<f64>, S::Error> {
+        steadiness: &mut Steadiness,
+    ) -> Result<(), S::Error> {
         let frames = station.frames.count();
         let expected = |(_, mean, variance): &(usize, f64, f64)| Some([*mean, *variance, line[0] * mean + line[1]]);
         let alike = Alike::new(frames, self.values.iter().map(expected));
-        let mut factors = Vec::with_capacity(frames);
+        steadiness.frame_values = alike.values();
         station.each(&mut |frame| {
-            factors.push(alike.factor(|place| usable(frame, units, self.values[place].0).unwrap_or(f64::NAN)));
+            let value = |place: usize| usable(frame, units, self.values[place].0).unwrap_or(f64::NAN);
+            steadiness.frame_factors.push(alike.factor(value));
             Ok(())
-        })?;
-        Ok(factors)
+        })
     }
 }
 

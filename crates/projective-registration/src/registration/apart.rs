@@ -41,9 +41,13 @@ impl FrameAligner {
         Ok(self.with_influence(result, frames))
     }
 
-    /// As [`FrameAligner::align_apart`], from a guess that is known as well as a registration knows it: the last steps alone, which hold
-    /// on to what lies within noise there. Something large that moves by itself draws no pose to where it would stand still, as where
-    /// all that is in reach takes part first. Nothing is searched for.
+    /// As [`FrameAligner::align_apart`], where something large may move by itself, from a guess `target_from_source` that is nearly known: by
+    /// the velocity, or a sensor of motion. Cells of the frame that stray from the target there, by more than most cells let expect, take no
+    /// part, and the last steps alone are gone, which hold on to what lies within noise of the guess. Nothing is searched for. The
+    /// covariance is of what took part.
+    ///
+    /// # Errors
+    /// As [`align_frames`](crate::align_frames).
     pub fn align_near(
         &mut self,
         source: &OrganisedFrame,

@@ -157,7 +157,7 @@ impl Tracker {
     /// The current frame and the keyframe of a candidate, where they are brought together as the claim of the reference asks.
     fn try_candidate(&mut self, k: usize, last: &Last, prediction: &Prediction, claim: &Claim) -> Option<Measured> {
         let between = self.keyframes.graph.relative(k, last.keyframe);
-        let found = self.try_expected(k, &prediction.seen_from(&between)).ok();
+        let found = self.try_keyframe(k, &(between * prediction.own.pose)).ok();
         found.filter(|measured| claim.is_met_by(measured, &between))
     }
 

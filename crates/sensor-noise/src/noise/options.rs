@@ -7,8 +7,8 @@ pub struct NoiseFitOptions {
     pub bins: usize,
     /// Largest share of values whose scatter no noise explains (motion, gross errors); they are left out. Default: 0.2.
     pub largest_moved_share: f64,
-    /// How much more one frame may scatter than the others of its station before the frames count as unlike. Default:
-    /// 1.25.
+    /// How much more one frame may scatter than the others of its station before the frames count as unlike; more where chance
+    /// alone lets the values that are taken of a frame, few in long captures, scatter by more. Default: 1.25.
     pub largest_frame_factor: f64,
     /// Largest share of the variance that a drift may leave in successive differences. Default: 0.02.
     pub largest_drift_share: f64,

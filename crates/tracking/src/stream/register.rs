@@ -14,8 +14,6 @@ use rigid_pose::{InputError, Uncertain, step_pose};
 
 /// Smallest fraction of the planes that the keyframe can judge that must agree: what frames of different places reach by chance.
 const FEWEST_CONSENTING: f64 = 0.6;
-/// Ratio of two misfits that differ by more than chance: medians of 300 cells scatter by a fifteenth, three times which is taken.
-const CLEARLY: f64 = 1.2;
 
 /// Registers a frame with another from where the camera is expected. What is in reach of that all takes part first, and something large
 /// that moves by itself may draw the pose along: where the prediction does not bear out what comes of it, the frames are brought together
@@ -36,14 +34,13 @@ pub(crate) fn register_expected(
     }
     let Ok(near) = judged(aligner.align_near(source, target, guess), source, target, field) else { return first };
     let is_better = match &first {
-        Ok(first) if first.determined => lies_better(aligner, source, target, &near, first),
+        Ok(first) if first.determined => near.determined && lies_better(aligner, source, target, &near, first),
         _ => borne_out(&near),
     };
     if is_better { Ok(near) } else { first }
 }
 
-/// Whether surfaces lie on each other better at another pose than at the first one, and it is another one: one that is not determined,
-/// as what determined the first has moved by itself, has to be clearly better.
+/// Whether another pose contradicts the first one, and surfaces lie on each other better there.
 fn lies_better(
     aligner: &mut FrameAligner,
     source: &OrganisedFrame,
@@ -51,13 +48,11 @@ fn lies_better(
     other: &Measured,
     first: &Measured,
 ) -> bool {
-    let is_same = other.own().mahalanobis_squared(&first.own()).is_some_and(is_likely);
-    if other.determined && is_same {
+    if other.own().mahalanobis_squared(&first.own()).is_some_and(is_likely) {
         return false;
     }
     let mut off = |measured: &Measured| aligner.misfit(source, target, &measured.aligned);
-    let (Some(other_off), Some(first_off)) = (off(other), off(first)) else { return false };
-    if other.determined { other_off < first_off } else { CLEARLY * other_off < first_off }
+    off(other).zip(off(first)).is_some_and(|(other, first)| other < first)
 }
 
 /// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.

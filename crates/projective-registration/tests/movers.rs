@@ -82,3 +82,20 @@ fn frames_without_a_common_surface_have_no_misfit() {
     assert_eq!(aligner.misfit(&frame, &frame, &behind), None);
     assert!(aligner.align_near(&frame, &frame, &behind).is_err());
 }
+
+#[test]
+fn registrations_of_frames_of_one_size_allocate_once() {
+    let (start, mut aligner) = (Isometry3::identity(), FrameAligner::new(FrameAlignmentOptions::default()).unwrap());
+    let (target, source) = (seen(&start, 0.9, 0), seen(&start, 0.94, 1));
+    // Allocations of other threads are not counted.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    pool.install(|| {
+        let mut all_ways = || {
+            aligner.align(&source, &target, &start).unwrap();
+            aligner.align_near(&source, &target, &start).unwrap();
+            assert!(aligner.misfit(&source, &target, &start).is_some());
+        };
+        assert!(allocation_counter::measure(&mut all_ways).count_total > 0);
+        assert_eq!(allocation_counter::measure(all_ways).count_total, 0);
+    });
+}

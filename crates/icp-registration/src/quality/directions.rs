@@ -31,7 +31,7 @@ pub(crate) struct Direction {
 /// Directions of the information, worst first, with the covariance of the score.
 #[derive(Debug, Clone)]
 pub struct Directions {
-    all: Vec<Direction>,
+    all: [Direction; 6],
     score: Matrix6<f64>,
 }
 
@@ -61,13 +61,12 @@ impl Directions {
         let inverse = directions.iter().filter(|(_, _, significant)| *significant);
         let inverse = inverse.fold(Matrix6::zeros(), |sum, (v, i, _)| sum + v * v.transpose() / *i);
         let (score, enlarged) = score(&inverse);
-        let judged = directions.into_iter().map(|(vector, information, significant)| {
+        // Whether a motion is determined does not hang on how well its deviation is known.
+        let all = directions.map(|(vector, information, significant)| {
             let sigma_m =
                 if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
             Direction { vector, information, sigma_m, determined: sigma_m <= max_sigma_m }
         });
-        // Whether a motion is determined does not hang on how well its deviation is known.
-        let all = judged.collect();
         Ok(Self { all, score: score * enlarged })
     }
 
@@ -91,12 +90,14 @@ impl Directions {
     /// Covariance of motions `[dt, rho w]`: the sandwich `A⁻¹ M A⁻ᵀ` of the covariance of the score and the response A of the score to
     /// the pose (`response`; the information where that has nothing to say). What is not known at all gets the radius as sigma.
     pub fn covariance(&self, radius_m: f64, response: Option<&Matrix6<f64>>) -> Matrix6<f64> {
-        let (known, unknown): (Vec<&Direction>, Vec<&Direction>) = self.all.iter().partition(|d| d.sigma_m.is_finite());
-        let inverse = response.and_then(|response| inverse_response(&known, response)).unwrap_or_else(|| {
-            known.iter().fold(Matrix6::zeros(), |sum, d| sum + d.vector * d.vector.transpose() / d.information)
+        let known = || self.all.iter().filter(|d| d.sigma_m.is_finite());
+        let inverse = response.and_then(|response| inverse_response(&known().collect::<Vec<_>>(), response));
+        let inverse = inverse.unwrap_or_else(|| {
+            known().fold(Matrix6::zeros(), |sum, d| sum + d.vector * d.vector.transpose() / d.information)
         });
         let own = inverse * self.score * inverse.transpose();
-        unknown.iter().fold(own, |sum, d| sum + d.vector * d.vector.transpose() * radius_m.powi(2))
+        let unknown = self.all.iter().filter(|d| !d.sigma_m.is_finite());
+        unknown.fold(own, |sum, d| sum + d.vector * d.vector.transpose() * radius_m.powi(2))
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Vector6};
 use rigid_pose::Centred;
 
 use crate::partners::pairs::{Moved, Rules};
-use crate::preparation::blocks::Block;
+use crate::preparation::blocks::{Block, Points};
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::STRIDES;
 
@@ -32,32 +32,38 @@ pub(crate) struct Track {
 pub(crate) struct Frames<'a> {
     pub source: &'a OrganisedFrame,
     pub target: &'a OrganisedFrame,
+    /// Points of the source that take part.
+    pub points: &'a Points,
 }
 
 impl<'a> Frames<'a> {
+    pub(crate) fn new(source: &'a OrganisedFrame, target: &'a OrganisedFrame) -> Self {
+        Self { source, target, points: &source.points }
+    }
+
     /// Of the source, metre: the unit of lengths.
     pub(crate) fn radius_m(self) -> f64 {
-        self.source.points.radius_m
+        self.points.radius_m
     }
 
     /// The blocks of a level.
     pub(crate) fn blocks(self, level: usize) -> &'a [Block] {
-        &self.source.points.blocks[..self.source.grid.levels[level]]
+        &self.points.blocks[..self.source.grid.levels[level]]
     }
 
     pub(crate) fn all_blocks(self) -> &'a [Block] {
-        &self.source.points.blocks
+        &self.points.blocks
     }
 
     /// The first level that is passed: one with enough nodes, or the last.
     pub(crate) fn first_level(self) -> usize {
-        (0..LAST_LEVEL).find(|level| self.source.points.counts[*level] >= FEWEST_POINTS).unwrap_or(LAST_LEVEL)
+        (0..LAST_LEVEL).find(|level| self.points.counts[*level] >= FEWEST_POINTS).unwrap_or(LAST_LEVEL)
     }
 
     /// A quarter of the nodes, where these are enough.
     pub(crate) fn finest_part(self) -> &'a [Block] {
         let part = LAST_LEVEL - 1;
-        if self.source.points.counts[part] >= FEWEST_POINTS { self.blocks(part) } else { self.all_blocks() }
+        if self.points.counts[part] >= FEWEST_POINTS { self.blocks(part) } else { self.all_blocks() }
     }
 
     /// The source where a track has it, and about what its motions are.

@@ -51,6 +51,8 @@ pub struct FrameAligner {
     pub(crate) cells: Vec<Cell>,
     pub(crate) means: Vec<[f32; 2]>,
     pub(crate) sightings: Vec<Sighting>,
+    /// Memory for the points of a source without what strays.
+    pub(crate) rest: Vec<Block>,
 }
 
 impl FrameAligner {
@@ -65,6 +67,7 @@ impl FrameAligner {
             cells: Vec::new(),
             means: Vec::new(),
             sightings: Vec::new(),
+            rest: Vec::new(),
         })
     }
 

@@ -36,7 +36,7 @@ impl FrameAligner {
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
     ) -> Result<(IcpResult, Option<Influence>)> {
-        let frames = Frames { source, target };
+        let frames = Frames::new(source, target);
         let result = self.registered(frames, guess)?;
         Ok(self.with_influence(result, frames))
     }
@@ -54,15 +54,16 @@ impl FrameAligner {
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
     ) -> Result<(IcpResult, Option<Influence>)> {
-        let rest = self.without_strays(source, target, guess);
-        let frames = Frames { source: &rest, target };
-        let track = Self::start(frames, guess)?;
-        let (_, result) = self.end(track, frames)?;
-        Ok(self.with_influence(result, frames))
+        let points = self.without_strays(source, target, guess);
+        let frames = Frames { source, target, points: &points };
+        let result = Self::start(frames, guess).and_then(|track| self.end(track, frames));
+        let result = result.map(|(_, result)| self.with_influence(result, frames));
+        self.rest = points.blocks;
+        result
     }
 
     fn with_influence(&mut self, result: IcpResult, frames: Frames<'_>) -> (IcpResult, Option<Influence>) {
-        let Frames { source, target } = frames;
+        let Frames { source, target, .. } = frames;
         let influence = target.influence(source, &result.target_from_source, &mut self.sightings, &mut self.scratch);
         (result, influence)
     }

@@ -87,7 +87,7 @@ pub fn frame_consistency(
 ) -> FrameConsistency {
     let level = STRIDES.iter().position(|s| *s <= stride).unwrap_or(STRIDES.len() - 1);
     let radius_m = source.points.radius_m.max(target.points.radius_m);
-    consistency(Frames { source, target }, target_from_source, level, TOLERANCE * radius_m)
+    consistency(Frames::new(source, target), target_from_source, level, TOLERANCE * radius_m)
 }
 
 /// As [`frame_consistency`], with the number of a level.
@@ -99,13 +99,13 @@ pub(crate) fn consistency(
 ) -> FrameConsistency {
     let (there, back) = rayon::join(
         || one_way(frames, pose, level, tolerance_m),
-        || one_way(Frames { source: frames.target, target: frames.source }, &pose.inverse(), level, tolerance_m),
+        || one_way(Frames::new(frames.target, frames.source), &pose.inverse(), level, tolerance_m),
     );
     there + back
 }
 
 fn one_way(frames: Frames<'_>, pose: &Isometry3<f64>, level: usize, tolerance_m: f64) -> FrameConsistency {
-    let Frames { source, target } = frames;
+    let Frames { source, target, .. } = frames;
     let moved = Moved::new(source, target, pose, &Vector3::zeros(), 1.0);
     let mut counts = FrameConsistency::default();
     let compare =

@@ -15,7 +15,7 @@ use statistics::SIGMA_OF_MAD;
 use crate::partners::locate::{Locate, WithLocate, with_locate};
 use crate::partners::pairs::{AT_ONCE, Moved};
 use crate::preparation::bits::{median_of_bits, positive_bits};
-use crate::preparation::blocks::Block;
+use crate::preparation::blocks::{Block, Points};
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::BLOCK;
 use crate::registration::aligner::FrameAligner;
@@ -41,24 +41,26 @@ impl FrameAligner {
         median_of_bits(&mut self.scratch).map(f64::from)
     }
 
-    /// A frame without the cells that lie beside the surfaces of another one, at a pose, farther than most cells let expect.
+    /// The points of a frame without the cells that lie beside the surfaces of another one, at a pose, farther than most cells let expect.
+    /// Their memory is that of the aligner, to be given back.
     pub(crate) fn without_strays(
         &mut self,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
         pose: &Isometry3<f64>,
-    ) -> OrganisedFrame {
-        let mut rest = source.clone();
+    ) -> Points {
         let usual = SIGMA_OF_MAD * self.misfit(source, target, pose).unwrap_or(0.0);
         let reach = (TUKEY * usual.max(1.0)) as f32;
-        for (block, cells) in rest.points.blocks.iter_mut().zip(&source.grid.cells) {
+        let mut blocks = std::mem::take(&mut self.rest);
+        blocks.clone_from(&source.points.blocks);
+        for (block, cells) in blocks.iter_mut().zip(&source.grid.cells) {
             for (variance, cell) in block.variance.iter_mut().zip(cells) {
                 if in_sigmas(self.means[usize::from(*cell)]) > reach {
                     *variance = f32::NAN;
                 }
             }
         }
-        rest
+        Points { blocks, ..source.points }
     }
 }
 

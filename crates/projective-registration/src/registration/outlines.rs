@@ -39,7 +39,7 @@ impl<'a> Outlines<'a> {
 
     /// Points at jumps of either frame that lie in front of planes of the other; where there are more than `most`, more than that.
     fn contradicting(&self, pose: &Isometry3<f64>, most: usize) -> usize {
-        let (Frames { source, target }, tolerance_m) = (self.frames, self.tolerance_m);
+        let (Frames { source, target, .. }, tolerance_m) = (self.frames, self.tolerance_m);
         let there = with_locate(target, InFront { target, points: &self.points[0], pose, tolerance_m, most });
         let (pose, most) = (&pose.inverse(), most.saturating_sub(there));
         there + with_locate(source, InFront { target: source, points: &self.points[1], pose, tolerance_m, most })
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn where_one_side_is_open_nothing_runs_away() {
         let (target, source) = (seen_from([9.0, 0.0]), seen_from([9.1, 0.0]));
-        let outlines = Outlines::new(Frames { source: &source, target: &target });
+        let outlines = Outlines::new(Frames::new(&source, &target));
         let slide = UndeterminedMotion {
             kind: MotionKind::Translation,
             axis: Vector3::x(),

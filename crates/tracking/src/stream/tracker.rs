@@ -28,8 +28,8 @@ const FEWEST_PLANES: f64 = 0.03;
 
 /// Tracks a stream of organised frames of one camera.
 ///
-/// Memory is allocated for keyframes and for the list of poses; a frame that makes no keyframe allocates nothing of its
-/// own. The same frames give the same bits for any number of threads.
+/// Memory is allocated for keyframes and for the list of poses; a frame that makes no keyframe allocates nothing, or a list of a
+/// few numbers where it looks for another keyframe. The same frames give the same bits for any number of threads.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     pub(crate) options: TrackerOptions,

@@ -5,7 +5,6 @@ use nalgebra::{Isometry3, Matrix6};
 use crate::motion_model::motion::diagonal;
 use crate::motion_model::prediction::{Grounds, Prediction};
 use crate::stream::locate::Measured;
-use pose_graph::is_likely;
 use rigid_pose::Uncertain;
 
 /// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, or go where its velocity is not known,
@@ -20,6 +19,8 @@ pub(crate) struct Claim {
     /// Reference from camera, where another registration must find the camera. Where the velocity bears the reference out, what contradicts
     /// moves by itself, and would draw another pose along; where it does not, the reference may have been drawn along.
     held: Option<Uncertain>,
+    /// The reference's own registration, where it determines the pose.
+    pub(crate) determined: Option<Measured>,
     is_doubtful: bool,
     grounded: bool,
     radius_m: f64,
@@ -28,12 +29,13 @@ pub(crate) struct Claim {
 impl Claim {
     pub(crate) fn of(first: Option<&Measured>, prediction: &Prediction, radius_m: f64) -> Self {
         let firm = first.is_some_and(|measured| measured.is_firm(radius_m));
-        let determined = first.filter(|measured| measured.determined).map(Measured::own);
-        let borne_out = determined.is_some_and(|own| prediction.bears_out(&own));
+        let determined = first.filter(|measured| measured.determined).copied();
+        let borne_out = determined.is_some_and(|measured| prediction.bears_out(&measured.own()));
         let grounded = prediction.grounds != Grounds::Nothing;
         Self {
             is_settled: firm && (borne_out || !grounded),
             held: (firm || borne_out).then_some(prediction.own),
+            determined,
             is_doubtful: !first.is_some_and(Measured::agrees),
             grounded,
             radius_m,
@@ -52,9 +54,7 @@ impl Claim {
 
     /// Whether another registration finds the camera where it can be.
     pub(crate) fn is_met_by(&self, measured: &Measured, keyframe_from_reference: &Isometry3<f64>) -> bool {
-        let expected = |held: &Uncertain| Uncertain::exact(*keyframe_from_reference).then(held);
-        let is_held = |held: &Uncertain| measured.own().mahalanobis_squared(&expected(held)).is_some_and(is_likely);
-        self.held.as_ref().is_none_or(is_held)
+        !self.held.is_some_and(|held| measured.contradicts(&held, keyframe_from_reference))
     }
 }
 

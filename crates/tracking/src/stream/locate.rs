@@ -6,7 +6,7 @@ use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
 use crate::stream::claim::{Claim, reachable};
 use crate::stream::keyframes::CANDIDATES;
-use crate::stream::register::{register, register_expected};
+use crate::stream::register::{contradict, register, register_expected};
 use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
 use pose_graph::{Relation, is_likely};
@@ -82,6 +82,11 @@ impl Measured {
         self.pose.covariance * self.influence.map_or(1.0, |influence| influence.kept)
     }
 
+    /// Whether it lies farther from a pose `reference_from_camera` than both let expect.
+    pub(crate) fn contradicts(&self, other: &Uncertain, keyframe_from_reference: &Isometry3<f64>) -> bool {
+        contradict(&self.own(), &Uncertain::exact(*keyframe_from_reference).then(other))
+    }
+
     /// Derivative of the pose by the field that is assumed.
     pub(crate) fn by_field(&self) -> ByField {
         self.influence.map_or_else(ByField::zeros, |influence| -influence.pose)
@@ -132,33 +137,49 @@ impl Tracker {
             .map(|measured| Measured { keyframe: k, ..measured })
     }
 
-    /// The frame before as a new keyframe, where it determines what its own keyframe, with less in common, does not, or
-    /// agrees where that one does not.
-    pub(crate) fn with_previous(
-        &mut self,
-        last: &Last,
-        prediction: &Prediction,
-        helps: impl Fn(&Measured) -> bool,
-    ) -> Option<Measured> {
+    /// The current frame and the one before, which is no keyframe yet.
+    pub(crate) fn try_previous(&mut self, last: &Last, prediction: &Prediction) -> Option<Measured> {
         let exact = last.own.covariance == Matrix6::zeros();
         if last.lost_frames > 0 || exact {
             return None;
         }
         let (expected, field) = (prediction.seen_from(&last.own.pose.inverse()), &self.keyframes.graph.field);
-        let measured = register_expected(&mut self.aligner, &self.current, &self.previous, &expected, field).ok()?;
-        helps(&measured).then(|| {
-            let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
-            let relation = Relation { random: total, by_field: last.by_field };
-            let keyframe = self.keyframes.add(&self.previous, last.keyframe, &relation);
-            Measured { keyframe, ..measured }
-        })
+        register_expected(&mut self.aligner, &self.current, &self.previous, &expected, field).ok()
     }
 
-    /// The current frame and the keyframe of a candidate, where they are brought together as the claim of the reference asks.
+    /// Makes the frame before a keyframe, with which the current one has been registered.
+    pub(crate) fn keep_previous(&mut self, last: &Last, measured: &Measured) -> Measured {
+        let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
+        let relation = Relation { random: total, by_field: last.by_field };
+        let keyframe = self.keyframes.add(&self.previous, last.keyframe, &relation);
+        Measured { keyframe, ..*measured }
+    }
+
+    /// The current frame and the keyframe of a candidate, where they are brought together as the reference lets expect.
     fn try_candidate(&mut self, k: usize, last: &Last, prediction: &Prediction, claim: &Claim) -> Option<Measured> {
         let between = self.keyframes.graph.relative(k, last.keyframe);
-        let found = self.try_keyframe(k, &(between * prediction.own.pose)).ok();
-        found.filter(|measured| claim.is_met_by(measured, &between))
+        let found = self.try_keyframe(k, &(between * prediction.own.pose)).ok()?;
+        self.is_met(claim, Some(k), &found, &between).then_some(found)
+    }
+
+    /// Whether a registration with keyframe `k`, or with the frame before, is as the claim of the reference asks: it finds the camera where
+    /// that can be, and if it contradicts the reference's own, surfaces lie on each other better there.
+    fn is_met(
+        &mut self,
+        claim: &Claim,
+        k: Option<usize>,
+        measured: &Measured,
+        keyframe_from_reference: &Isometry3<f64>,
+    ) -> bool {
+        if !claim.is_met_by(measured, keyframe_from_reference) {
+            return false;
+        }
+        let denied = |first: &Measured| measured.contradicts(&first.own(), keyframe_from_reference);
+        let Some(first) = claim.determined.filter(denied) else { return true };
+        let keyframe = |k: usize| &self.keyframes.list[k].frame;
+        let (other, reference) = (k.map_or(&self.previous, keyframe), keyframe(first.keyframe));
+        let mut off = |frame, measured: &Measured| self.aligner.misfit(&self.current, frame, &measured.aligned);
+        off(other, measured).zip(off(reference, &first)).is_some_and(|(off, of_reference)| off < of_reference)
     }
 
     /// The current frame near its predicted pose: from the reference, or from keyframes that should see the same.
@@ -180,9 +201,9 @@ impl Tracker {
             return Ok(measured);
         }
         let from_previous = last.own.pose.inverse();
-        let helps = |measured: &Measured| claim.is_helped_by(measured) && claim.is_met_by(measured, &from_previous);
-        if let Some(measured) = self.with_previous(last, prediction, helps) {
-            return Ok(measured);
+        let previous = self.try_previous(last, prediction).filter(|measured| claim.is_helped_by(measured));
+        if let Some(measured) = previous.filter(|measured| self.is_met(&claim, None, measured, &from_previous)) {
+            return Ok(self.keep_previous(last, &measured));
         }
         if first.as_ref().is_ok_and(|measured| claim.is_usable(measured) && measured.agrees()) {
             return first;

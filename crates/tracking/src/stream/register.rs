@@ -15,10 +15,15 @@ use rigid_pose::{InputError, Uncertain, step_pose};
 /// Smallest fraction of the planes that the keyframe can judge that must agree: what frames of different places reach by chance.
 const FEWEST_CONSENTING: f64 = 0.6;
 
+/// What the misfits of two poses, medians over some 400 cells, differ by once in a thousand times by chance: `1 + 3.1 sqrt(2) 1.17 / sqrt(400)`,
+/// where 1.17 is the relative standard deviation of the median size of a normal value, times the root of their number. With 1.0 one frame is
+/// lost without need in ten streams; 1.0 and 1.25 find the same wrong poses (at least 1.6).
+const BEYOND_CHANCE: f64 = 1.25;
+
 /// Registers a frame with another from where the camera is expected. What is in reach of that all takes part first, and something large
 /// that moves by itself may draw the pose along: where the prediction does not bear out what comes of it, the frames are brought together
 /// without what strays at the prediction, too, and of poses that contradict each other the one at which surfaces lie on each other better
-/// is taken.
+/// is taken; a pose with a motion open where only what strays determines it.
 pub(crate) fn register_expected(
     aligner: &mut FrameAligner,
     source: &OrganisedFrame,
@@ -34,13 +39,14 @@ pub(crate) fn register_expected(
     }
     let Ok(near) = judged(aligner.align_near(source, target, guess), source, target, field) else { return first };
     let is_better = match &first {
-        Ok(first) if first.determined => near.determined && lies_better(aligner, source, target, &near, first),
+        Ok(first) if first.determined => lies_better(aligner, source, target, &near, first),
         _ => borne_out(&near),
     };
     if is_better { Ok(near) } else { first }
 }
 
-/// Whether another pose contradicts the first one, and surfaces lie on each other better there.
+/// Whether surfaces lie on each other better at another pose that contradicts the first one, or leaves open what the first one determines:
+/// what strays alone did so.
 fn lies_better(
     aligner: &mut FrameAligner,
     source: &OrganisedFrame,
@@ -48,11 +54,17 @@ fn lies_better(
     other: &Measured,
     first: &Measured,
 ) -> bool {
-    if other.own().mahalanobis_squared(&first.own()).is_some_and(is_likely) {
+    if other.determined && !contradict(&other.own(), &first.own()) {
         return false;
     }
+    let clearly = if other.determined { 1.0 } else { BEYOND_CHANCE };
     let mut off = |measured: &Measured| aligner.misfit(source, target, &measured.aligned);
-    off(other).zip(off(first)).is_some_and(|(other, first)| other < first)
+    off(other).zip(off(first)).is_some_and(|(other, first)| clearly * other < first)
+}
+
+/// Whether two poses lie farther from each other than their covariances let expect.
+pub(crate) fn contradict(a: &Uncertain, b: &Uncertain) -> bool {
+    !a.mahalanobis_squared(b).is_some_and(is_likely)
 }
 
 /// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.

@@ -251,7 +251,8 @@ impl Tracker {
         }
         let near = self.near(last, prediction).and_then(|measured| self.placed(&measured, last, prediction));
         let near = near.or_else(|reason| {
-            let measured = self.with_previous(last, prediction, Measured::is_sound).ok_or(reason)?;
+            let measured = self.try_previous(last, prediction).filter(Measured::is_sound).ok_or(reason)?;
+            let measured = self.keep_previous(last, &measured);
             self.placed(&measured, last, prediction)
         });
         let found = match &near {
@@ -262,6 +263,8 @@ impl Tracker {
                 let ranked = self.ranked();
                 self.alike(&ranked)
             }
+            // It lies on the reference, with a motion open: the camera is not elsewhere.
+            Err(LossReason::Undetermined) if last.lost_frames == 0 => None,
             Err(_) => self.wide(last.lost_frames),
         };
         found.map_or(near, |measured| Ok((measured, Fix::unexpected(&measured))))

@@ -19,8 +19,6 @@ pub(crate) struct Claim {
     /// Reference from camera, where another registration must find the camera. Where the velocity bears the reference out, what contradicts
     /// moves by itself, and would draw another pose along; where it does not, the reference may have been drawn along.
     held: Option<Uncertain>,
-    /// The reference's own registration, where it determines the pose.
-    pub(crate) determined: Option<Measured>,
     is_doubtful: bool,
     grounded: bool,
     radius_m: f64,
@@ -29,13 +27,11 @@ pub(crate) struct Claim {
 impl Claim {
     pub(crate) fn of(first: Option<&Measured>, prediction: &Prediction, radius_m: f64) -> Self {
         let firm = first.is_some_and(|measured| measured.is_firm(radius_m));
-        let determined = first.filter(|measured| measured.determined).copied();
-        let borne_out = determined.is_some_and(|measured| prediction.bears_out(&measured.own()));
+        let borne_out = first.is_some_and(|measured| measured.determined && prediction.bears_out(&measured.own()));
         let grounded = prediction.grounds != Grounds::Nothing;
         Self {
             is_settled: firm && (borne_out || !grounded),
             held: (firm || borne_out).then_some(prediction.own),
-            determined,
             is_doubtful: !first.is_some_and(Measured::agrees),
             grounded,
             radius_m,

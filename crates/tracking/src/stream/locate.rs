@@ -158,28 +158,24 @@ impl Tracker {
     /// The current frame and the keyframe of a candidate, where they are brought together as the reference lets expect.
     fn try_candidate(&mut self, k: usize, last: &Last, prediction: &Prediction, claim: &Claim) -> Option<Measured> {
         let between = self.keyframes.graph.relative(k, last.keyframe);
-        let found = self.try_keyframe(k, &(between * prediction.own.pose)).ok()?;
-        self.is_met(claim, Some(k), &found, &between).then_some(found)
+        let found = self.try_keyframe(k, &(between * prediction.own.pose)).ok();
+        found.filter(|measured| claim.is_met_by(measured, &between))
     }
 
-    /// Whether a registration with keyframe `k`, or with the frame before, is as the claim of the reference asks: it finds the camera where
-    /// that can be, and if it contradicts the reference's own, surfaces lie on each other better there.
-    fn is_met(
+    /// Whether surfaces lie on each other better with the frame before than with the reference, where the poses contradict each other. (Of a
+    /// keyframe that is there already that is not asked: its planes are known better than those of a frame, and lie worse for it.)
+    fn is_borne_out_by(
         &mut self,
-        claim: &Claim,
-        k: Option<usize>,
-        measured: &Measured,
-        keyframe_from_reference: &Isometry3<f64>,
+        first: Option<&Measured>,
+        previous: &Measured,
+        previous_from_reference: &Isometry3<f64>,
     ) -> bool {
-        if !claim.is_met_by(measured, keyframe_from_reference) {
-            return false;
-        }
-        let denied = |first: &Measured| measured.contradicts(&first.own(), keyframe_from_reference);
-        let Some(first) = claim.determined.filter(denied) else { return true };
-        let keyframe = |k: usize| &self.keyframes.list[k].frame;
-        let (other, reference) = (k.map_or(&self.previous, keyframe), keyframe(first.keyframe));
+        let denied =
+            |first: &&Measured| first.determined && previous.contradicts(&first.own(), previous_from_reference);
+        let Some(first) = first.filter(denied) else { return true };
+        let reference = &self.keyframes.list[first.keyframe].frame;
         let mut off = |frame, measured: &Measured| self.aligner.misfit(&self.current, frame, &measured.aligned);
-        off(other, measured).zip(off(reference, &first)).is_some_and(|(off, of_reference)| off < of_reference)
+        off(&self.previous, previous).zip(off(reference, first)).is_some_and(|(off, of_reference)| off < of_reference)
     }
 
     /// The current frame near its predicted pose: from the reference, or from keyframes that should see the same.
@@ -201,8 +197,9 @@ impl Tracker {
             return Ok(measured);
         }
         let from_previous = last.own.pose.inverse();
-        let previous = self.try_previous(last, prediction).filter(|measured| claim.is_helped_by(measured));
-        if let Some(measured) = previous.filter(|measured| self.is_met(&claim, None, measured, &from_previous)) {
+        let helps = |measured: &Measured| claim.is_helped_by(measured) && claim.is_met_by(measured, &from_previous);
+        let previous = self.try_previous(last, prediction).filter(helps);
+        if let Some(measured) = previous.filter(|m| self.is_borne_out_by(first.as_ref().ok(), m, &from_previous)) {
             return Ok(self.keep_previous(last, &measured));
         }
         if first.as_ref().is_ok_and(|measured| claim.is_usable(measured) && measured.agrees()) {

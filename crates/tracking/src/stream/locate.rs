@@ -164,7 +164,7 @@ impl Tracker {
 
     /// Whether surfaces lie on each other better with the frame before than with the reference, where the poses contradict each other. (Of a
     /// keyframe that is there already that is not asked: its planes are known better than those of a frame, and lie worse for it.)
-    fn is_borne_out_by(
+    fn previous_lies_better(
         &mut self,
         first: Option<&Measured>,
         previous: &Measured,
@@ -199,7 +199,7 @@ impl Tracker {
         let from_previous = last.own.pose.inverse();
         let helps = |measured: &Measured| claim.is_helped_by(measured) && claim.is_met_by(measured, &from_previous);
         let previous = self.try_previous(last, prediction).filter(helps);
-        if let Some(measured) = previous.filter(|m| self.is_borne_out_by(first.as_ref().ok(), m, &from_previous)) {
+        if let Some(measured) = previous.filter(|m| self.previous_lies_better(first.as_ref().ok(), m, &from_previous)) {
             return Ok(self.keep_previous(last, &measured));
         }
         if first.as_ref().is_ok_and(|measured| claim.is_usable(measured) && measured.agrees()) {

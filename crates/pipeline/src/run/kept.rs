@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use camera_model::Camera;
 use range_image::{Flags, Modulation, Raster};
-use statistics::{quantile, robust_standard_deviation};
+use statistics::{Thinning, quantile, robust_standard_deviation};
 
 use crate::Result;
 use crate::run::figures::pictures::{PICTURED_STATIONS, Pictures};
@@ -12,7 +12,6 @@ use crate::run::stream::Before;
 use crate::run::summary::ReferenceSummary;
 use crate::survey::open::OpenSurvey;
 use crate::survey::records::{ViewRecord, usable};
-use crate::survey::thinning::Thinning;
 use crate::survey::truth::{TruthTally, range_errors, wrap};
 use crate::survey::view::{Snapshot, View, ViewData};
 use crate::trends::Residuals;
@@ -170,7 +169,7 @@ impl Kept {
             (flags[pixel].is_empty() && difference.is_finite()).then_some(difference)
         };
         self.compared += (0..range.len()).filter_map(difference).count();
-        self.differences.extend(self.thinning.pixels(self.views.len(), range.len()).filter_map(difference));
+        self.differences.extend(self.thinning.indices(self.views.len(), range.len()).filter_map(difference));
     }
 
     /// Unflagged ranges against the reference, up to a constant, modulo the ambiguity interval.
@@ -197,7 +196,7 @@ impl Kept {
     fn keep_values(&mut self, view: &View, after: Option<&Snapshot>, errors: &Errors) {
         let (number, thinning, values) = (self.views.len(), self.thinning, &mut self.values);
         let (width, height) = view.size();
-        let pixels = || thinning.pixels(number, width * height);
+        let pixels = || thinning.indices(number, width * height);
         if let ViewData::Range(frame) = &view.data {
             let (sigma, flags) = (frame.sigma.as_slice(), frame.flags.as_slice());
             values

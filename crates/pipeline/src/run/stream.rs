@@ -1,7 +1,8 @@
 //! The frames of a survey, one after the other, through the stages up to registration.
 //!
-//! What is in memory at a time: at most [`READ_AT_ONCE`] frames as they were read, fewer where little memory is allowed; at most
-//! [`AVERAGED_AT_ONCE`] frames of a station that is averaged (and the means of as many parts), and the views of one station.
+//! What is in memory at a time: a frame for each thread on its way through the stages, fewer where little memory is allowed; at most
+//! [`AVERAGED_AT_ONCE`] frames of a station that is averaged (and the means of as many parts); the views of a station that are fused.
+//! How many go at once changes no result: each goes by itself, and what is found is gathered in their order.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -18,9 +19,6 @@ use crate::survey::view::View;
 use commands::Progress;
 use commands::memory::{FrameBytes, Memory, Work};
 use commands::plan::Stage;
-
-/// Frames that are read at once at most: reading is unpacking, which cores share.
-const READ_AT_ONCE: usize = 8;
 
 /// Frames that are averaged and tested at once, each kept as complex images. 64 of 640 x 480 pixels and one frequency take
 /// 350 MB; of fewer the tests would tell less of each part.
@@ -70,18 +68,21 @@ impl Order {
         before
     }
 
-    /// Frames that may be read at once in the memory that is allowed, beside what is on its way in any case.
-    fn read_at_once(&self, survey: &OpenSurvey, line: &Line) -> Result<usize> {
+    /// Frames, and means of them, that go through the stages at once in the memory that is allowed, beside what is on its way in any
+    /// case.
+    fn at_once(&self, survey: &OpenSurvey, line: &Line) -> Result<usize> {
         let bytes = FrameBytes::of(&survey.survey);
         let longest = self.units.iter().flatten().map(Vec::len).max().unwrap_or(0);
         let waiting = if line.average().is_some() { waiting(longest) } else { 0 };
-        let views = self.units.iter().map(Vec::len).max().unwrap_or(1);
-        let kept = waiting as u64 * bytes.waiting + views as u64 * bytes.staged;
+        // Those that are fused are in memory together.
+        let others = self.units.iter().map(Vec::len).max().unwrap_or(1).saturating_sub(1);
+        let kept = waiting as u64 * bytes.waiting + others as u64 * bytes.staged;
         let what = match waiting {
             0 => "taking frames through the stages".to_owned(),
             _ => format!("averaging {longest} frames of a station"),
         };
-        Memory::present().at_once(&Work { what: &what, kept, each: bytes.read, most: READ_AT_ONCE })
+        let (each, most) = (bytes.read + bytes.staged, rayon::current_num_threads());
+        Memory::present().at_once(&Work { what: &what, kept, each, most })
     }
 
     /// The frames, as the survey counts them.
@@ -155,7 +156,7 @@ struct Stream<'a> {
     progress: &'a dyn Progress,
     waiting: std::vec::IntoIter<usize>,
     read: VecDeque<View>,
-    read_at_once: usize,
+    at_once: usize,
     looked: FrameWatch,
     stored: StoredWatch,
     done: usize,
@@ -174,11 +175,13 @@ pub(crate) fn stream(
     let waiting: Vec<usize> = order.units.iter().flatten().flatten().copied().collect();
     progress.begin("frames", waiting.len());
     let (waiting, read) = (waiting.into_iter(), VecDeque::new());
-    let read_at_once = order.read_at_once(survey, line)?;
+    let at_once = order.at_once(survey, line)?;
+    // What is fused are the views of one station.
+    let together = if line.fuses() { 1 } else { at_once };
     let (looked, stored) = (FrameWatch::default(), StoredWatch::default());
-    let mut stream = Stream { survey, line, watch, progress, waiting, read, read_at_once, looked, stored, done: 0 };
-    for unit in &order.units {
-        stream.unit(unit)?.into_iter().try_for_each(&mut *keep)?;
+    let mut stream = Stream { survey, line, watch, progress, waiting, read, at_once, looked, stored, done: 0 };
+    for units in order.units.chunks(together) {
+        stream.units(units)?.into_iter().try_for_each(&mut *keep)?;
     }
     Ok((stream.looked, stream.stored))
 }
@@ -196,10 +199,10 @@ pub fn follow_station(
 }
 
 impl Stream<'_> {
-    fn unit(&mut self, groups: &[Group]) -> Result<Vec<View>> {
+    fn units(&mut self, units: &[Vec<Group>]) -> Result<Vec<View>> {
         let average = self.line.average();
         let mut views = Vec::new();
-        for frames in groups {
+        for frames in units.iter().flatten() {
             views.push(match average {
                 Some(number) => self.mean(number, frames)?,
                 None => self.next()?,
@@ -207,15 +210,15 @@ impl Stream<'_> {
         }
         let rest = average.map_or(0, |number| number + 1)..self.line.steps().len();
         self.line.apply_some(rest, &mut views, self.watch)?;
-        self.done += groups.iter().map(Vec::len).sum::<usize>();
-        self.progress.advance(self.done);
+        if average.is_none() {
+            self.done += units.iter().flatten().map(Vec::len).sum::<usize>();
+            self.progress.advance(self.done);
+        }
         Ok(views)
     }
 
     fn mean(&mut self, number: usize, frames: &[usize]) -> Result<View> {
-        let before = self.done;
         let (view, tests) = self.part(number, frames)?;
-        self.done = before;
         self.line.record_mean(number, &view, &tests, self.watch);
         Ok(view)
     }
@@ -232,12 +235,12 @@ impl Stream<'_> {
                 tests = tests.join(found);
             }
         } else {
-            for _ in frames {
-                let mut one = vec![self.next()?];
-                self.line.apply_some(0..number, &mut one, self.watch)?;
-                self.done += 1;
+            for some in frames.chunks(self.at_once) {
+                let mut some = some.iter().map(|_| self.next()).collect::<Result<Vec<View>>>()?;
+                self.line.apply_some(0..number, &mut some, self.watch)?;
+                self.done += some.len();
                 self.progress.advance(self.done);
-                if let Some(view) = one.pop() {
+                for view in some {
                     views.push(beside(view, views.is_empty()));
                 }
             }
@@ -252,7 +255,7 @@ impl Stream<'_> {
     /// The frame whose turn it is.
     fn next(&mut self) -> Result<View> {
         if self.read.is_empty() {
-            let indices: Vec<usize> = self.waiting.by_ref().take(self.read_at_once).collect();
+            let indices: Vec<usize> = self.waiting.by_ref().take(self.at_once).collect();
             let views = indices.into_par_iter().map(|index| self.survey.view(index));
             self.read = views.collect::<Result<VecDeque<View>>>()?;
             self.progress.frames_in_memory(self.survey.live.count());

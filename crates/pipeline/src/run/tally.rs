@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use statistics::quantile;
+use statistics::{Thinning, quantile};
 
 use crate::Result;
 use crate::run::stream::Before;
@@ -10,7 +10,6 @@ use crate::stages::{Line, Watch};
 use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility::{SenseVotes, beyond_maximum};
 use crate::survey::records::StageSummary;
-use crate::survey::thinning::Thinning;
 use crate::survey::truth::{TruthTally, wrap};
 use crate::survey::view::{Snapshot, View};
 use commands::plan::Stage;
@@ -126,7 +125,7 @@ impl Tally {
                 let change = f64::from(after[pixel]) - f64::from(before[pixel]);
                 view.modulation.map_or(change, |modulation| wrap(change, modulation)).abs()
             };
-            changes.extend(tally.thinning.pixels(tally.views[1] + place, after.len()).map(change));
+            changes.extend(tally.thinning.indices(tally.views[1] + place, after.len()).map(change));
         }
     }
 }

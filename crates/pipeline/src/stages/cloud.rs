@@ -28,7 +28,7 @@ impl CorrectImagePoint {
 }
 
 impl ViewStage for CorrectImagePoint {
-    fn apply(&self, _: &mut Vec<View>, _: &mut Found) -> Result<()> {
+    fn apply(&self, _: &mut View, _: &mut Found) -> Result<()> {
         Ok(())
     }
 
@@ -56,19 +56,17 @@ pub(super) struct PointCloud {
 }
 
 impl ViewStage for PointCloud {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
-        for view in views {
-            let ViewData::Range(frame) = &view.data else {
-                return Err(Error::Needs { stage: "PointCloud", needs: "Unwrap" });
-            };
-            let points = self.rays.back_project(frame).and_then(|mut cloud| {
-                self.rays.take_off_pixel_width(&mut cloud)?;
-                Ok(cloud)
-            });
-            let cloud = points.map_err(Error::stage("PointCloud", &view.name()))?;
-            found.add("points", cloud.valid_count());
-            view.cloud = Some(cloud);
-        }
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()> {
+        let ViewData::Range(frame) = &view.data else {
+            return Err(Error::Needs { stage: "PointCloud", needs: "Unwrap" });
+        };
+        let points = self.rays.back_project(frame).and_then(|mut cloud| {
+            self.rays.take_off_pixel_width(&mut cloud)?;
+            Ok(cloud)
+        });
+        let cloud = points.map_err(Error::stage("PointCloud", &view.name()))?;
+        found.add("points", cloud.valid_count());
+        view.cloud = Some(cloud);
         Ok(())
     }
 }

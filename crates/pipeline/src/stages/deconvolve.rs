@@ -18,8 +18,8 @@ use commands::{Doubt, DoubtKind};
 pub(super) struct Deconvolve {
     psf: Psf,
     options: RestorationOptions,
-    /// Made for the size of the frames with the first of them, and used by one at a time.
-    tools: Mutex<Option<Tools>>,
+    /// Of the last images: as many as there were at the same time.
+    tools: Mutex<Vec<Tools>>,
 }
 
 impl Deconvolve {
@@ -31,29 +31,26 @@ impl Deconvolve {
             ));
         };
         let options = RestorationOptions { regularisation: options.regularisation, ..RestorationOptions::default() };
-        Ok(Self { psf, options, tools: Mutex::new(None) })
+        Ok(Self { psf, options, tools: Mutex::default() })
     }
 }
 
 impl ViewStage for Deconvolve {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
-        let mut tools = self.tools.lock().unwrap_or_else(PoisonError::into_inner);
-        for view in views {
-            let (name, size) = (view.name(), view.size());
-            let ViewData::Phase(frame) = &mut view.data else {
-                return Err(Error::Needs { stage: "Deconvolve", needs: "Demodulate" });
-            };
-            if tools.as_ref().is_none_or(|tools| tools.size != size) {
-                let made = Tools::new(&self.psf, size, &self.options);
-                *tools = Some(made.map_err(Error::stage("Deconvolve", &name))?);
-            }
-            if let Some(tools) = &mut *tools {
-                let light = tools.apply(frame).map_err(Error::stage("Deconvolve", &name))?;
-                found.add("dependent_px", light.dependent);
-                found.add("views_with_outside_light", usize::from(light.outside_light.is_some()));
-                found.doubts.extend(light.outside_light.and_then(|light| doubt(&view.station, &light, size)));
-            }
-        }
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()> {
+        let (name, size) = (view.name(), view.size());
+        let fail = |error| Error::stage("Deconvolve", &name)(error);
+        let ViewData::Phase(frame) = &mut view.data else {
+            return Err(Error::Needs { stage: "Deconvolve", needs: "Demodulate" });
+        };
+        let tools = || self.tools.lock().unwrap_or_else(PoisonError::into_inner);
+        // Not locked while they work: that is shared among threads, which may then take up another view.
+        let kept = tools().pop().filter(|kept| kept.size == size);
+        let mut own = kept.map_or_else(|| Tools::new(&self.psf, size, &self.options), Ok).map_err(fail)?;
+        let light = own.apply(frame).map_err(fail)?;
+        tools().push(own);
+        found.add("dependent_px", light.dependent);
+        found.add("views_with_outside_light", usize::from(light.outside_light.is_some()));
+        found.doubts.extend(light.outside_light.and_then(|light| doubt(&view.station, &light, size)));
         Ok(())
     }
 

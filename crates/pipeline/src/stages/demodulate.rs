@@ -31,26 +31,24 @@ impl Demodulate {
 }
 
 impl ViewStage for Demodulate {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
-        for view in views.iter_mut() {
-            found.add("frames", 1);
-            let (mut inconsistent, mut disturbed) = (0, false);
-            if let ViewData::Samples(raw) = &view.data {
-                let fail = |error| Error::stage("Demodulate", &view.name())(error);
-                let mut frame = ComplexFrame::empty();
-                self.demodulator.demodulate_into(raw, &mut frame).map_err(fail)?;
-                if let Some(check) = &self.consistency {
-                    inconsistent = check_frame(raw, &self.options, check, &mut frame).map_err(fail)?;
-                    let share = tell_interference(&mut frame, &self.interference).map_err(fail)?;
-                    disturbed = share >= self.interference.least_share;
-                }
-                view.data = ViewData::Phase(frame);
-                view.before = view.snapshot();
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()> {
+        found.add("frames", 1);
+        let (mut inconsistent, mut disturbed) = (0, false);
+        if let ViewData::Samples(raw) = &view.data {
+            let fail = |error| Error::stage("Demodulate", &view.name())(error);
+            let mut frame = ComplexFrame::empty();
+            self.demodulator.demodulate_into(raw, &mut frame).map_err(fail)?;
+            if let Some(check) = &self.consistency {
+                inconsistent = check_frame(raw, &self.options, check, &mut frame).map_err(fail)?;
+                let share = tell_interference(&mut frame, &self.interference).map_err(fail)?;
+                disturbed = share >= self.interference.least_share;
             }
-            if self.consistency.is_some() {
-                found.add("inconsistent_px", inconsistent);
-                found.add("frames_with_interference", usize::from(disturbed));
-            }
+            view.data = ViewData::Phase(frame);
+            view.before = view.snapshot();
+        }
+        if self.consistency.is_some() {
+            found.add("inconsistent_px", inconsistent);
+            found.add("frames_with_interference", usize::from(disturbed));
         }
         Ok(())
     }

@@ -24,8 +24,10 @@ impl Flag {
     pub(super) fn new(options: &FlagOptions, making: &Making<'_>) -> Self {
         Self { options: *options, rays: Arc::clone(&making.rays) }
     }
+}
 
-    fn flag(&self, view: &mut View, found: &mut Found) -> Result<()> {
+impl ViewStage for Flag {
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()> {
         let name = view.name();
         let ViewData::Range(frame) = &mut view.data else {
             return Err(Error::Needs { stage: "Flag", needs: "Unwrap" });
@@ -57,12 +59,6 @@ impl Flag {
             *point = [f64::NAN; 3];
         }
         Ok(())
-    }
-}
-
-impl ViewStage for Flag {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
-        views.iter_mut().try_for_each(|view| self.flag(view, found))
     }
 }
 

@@ -2,7 +2,7 @@ use std::f64::consts::TAU;
 
 use range_image::{Exposure, FusionOptions, Modulation, RangeFrame, fuse_exposures};
 
-use crate::stages::{Found, ViewStage};
+use crate::stages::Found;
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
 use commands::plan::FuseExposuresOptions;
@@ -15,8 +15,9 @@ pub(super) struct Fuse {
     pub(super) options: FuseExposuresOptions,
 }
 
-impl ViewStage for Fuse {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+impl Fuse {
+    /// Makes one view of those of a station, and adds what it finds.
+    pub(super) fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
         let (mut fused, mut pixels) = (0, [0; 2]);
         if views.len() > 1 {
             let view;

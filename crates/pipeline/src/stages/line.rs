@@ -5,9 +5,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use camera_model::{Camera, RayTable};
+use rayon::prelude::*;
 
 use crate::stages::average::{Average, Tests};
-use crate::stages::{Findings, Found, ViewStage, cloud, deconvolve, demodulate, flag, fuse, multipath, ranges, wraps};
+use crate::stages::fuse::Fuse;
+use crate::stages::{Findings, Found, ViewStage, cloud, deconvolve, demodulate, flag, multipath, ranges, wraps};
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::View;
 use crate::{Error, Result};
@@ -40,6 +42,8 @@ pub struct Step {
 
 enum Work {
     Views(Box<dyn ViewStage>),
+    /// Makes one view of those of a station.
+    Fuse(Fuse),
     /// Makes one view of all frames of a station.
     Mean(Average),
 }
@@ -96,6 +100,11 @@ impl Line {
         }
     }
 
+    /// Whether a stage works on all views of a station.
+    pub(crate) fn fuses(&self) -> bool {
+        self.steps.iter().any(|step| matches!(step.work, Work::Fuse(_)))
+    }
+
     /// Number of the stage that averages.
     pub(crate) fn average(&self) -> Option<usize> {
         self.steps.iter().position(|step| matches!(step.work, Work::Mean(_)))
@@ -112,7 +121,8 @@ impl Line {
             let step = &mut self.steps[number];
             watch.before(number, &step.stage, views);
             match &step.work {
-                Work::Views(stage) => stage.apply(views, &mut step.found)?,
+                Work::Views(stage) => each(stage.as_ref(), views, &mut step.found)?,
+                Work::Fuse(fuse) => fuse.apply(views, &mut step.found)?,
                 Work::Mean(average) => {
                     let (view, tests) = average.mean(std::mem::take(views))?;
                     Average::record(&tests, view.frames.len(), &mut step.found);
@@ -124,7 +134,7 @@ impl Line {
         Ok(())
     }
 
-    /// Takes the views of one station through all stages.
+    /// Takes views through all stages: those of one station where exposures are fused, or else any.
     pub fn apply(&mut self, views: &mut Vec<View>, watch: &mut dyn Watch) -> Result<()> {
         self.apply_some(0..self.steps.len(), views, watch)
     }
@@ -145,6 +155,16 @@ impl Line {
     }
 }
 
+/// Takes views through a stage at the same time; what is found, and the error of the first that has one, are in their order.
+fn each(stage: &dyn ViewStage, views: &mut [View], found: &mut Found) -> Result<()> {
+    let one = |view: &mut View| {
+        let mut own = Found::default();
+        stage.apply(view, &mut own).map(|()| own)
+    };
+    let all: Vec<Result<Found>> = views.par_iter_mut().map(one).collect();
+    all.into_iter().try_for_each(|own| own.map(|own| found.join(own)))
+}
+
 impl Step {
     /// The stage.
     pub fn stage(&self) -> &Stage {
@@ -155,6 +175,7 @@ impl Step {
     pub fn findings(&self) -> Findings {
         match &self.work {
             Work::Views(stage) => stage.findings(&self.found),
+            Work::Fuse(_) => self.found.sums.clone(),
             Work::Mean(_) => Average::findings(&self.found),
         }
     }
@@ -188,7 +209,7 @@ impl Work {
             Stage::CorrectRange(options) => Box::new(ranges::correct::CorrectRange::new(options, making)?),
             Stage::CorrectImagePoint(_) => Box::new(cloud::CorrectImagePoint::new(making)?),
             Stage::Multipath(options) => Box::new(multipath::Multipath::new(options, making)),
-            Stage::FuseExposures(options) => Box::new(fuse::Fuse { options: options.clone() }),
+            Stage::FuseExposures(options) => return Ok(Some(Self::Fuse(Fuse { options: options.clone() }))),
             Stage::PointCloud(_) => Box::new(cloud::PointCloud { rays: Arc::clone(&making.rays) }),
             Stage::Flag(options) => Box::new(flag::Flag::new(options, making)),
         };

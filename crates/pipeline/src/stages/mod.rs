@@ -35,10 +35,10 @@ pub fn corrects_ranges(calibration: &Calibration) -> bool {
     !calibration.range_models.is_empty() || calibration.warm_up.is_some()
 }
 
-/// A stage that works on the views of one station at a time, ready for a survey.
+/// A stage that works on each view by itself, ready for a survey; on several at the same time.
 pub(crate) trait ViewStage: Send + Sync {
-    /// Works on views, and adds what it finds.
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()>;
+    /// Works on a view, and adds what it finds.
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()>;
 
     /// What it found in all of them.
     fn findings(&self, found: &Found) -> Findings {
@@ -66,6 +66,16 @@ impl Found {
         tape.records(&mut self.doubts);
         tape.list(&mut self.drifts, ViewDrift::default, |tape, drift| drift.carry(tape));
         self.span.carry(tape);
+    }
+
+    /// Adds what was found in another view.
+    pub(crate) fn join(&mut self, other: Self) {
+        for (name, sum) in other.sums {
+            *self.sums.entry(name).or_default() += sum;
+        }
+        self.doubts.extend(other.doubts);
+        self.drifts.extend(other.drifts);
+        self.span.join(&other.span);
     }
 
     /// Adds to a number.

@@ -30,25 +30,23 @@ impl Multipath {
 }
 
 impl ViewStage for Multipath {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()> {
         let options = &self.options;
-        for view in views {
-            if !matches!(view.data, ViewData::Range(_)) {
-                return Err(Error::Needs { stage: "Multipath", needs: "Unwrap" });
-            }
-            if view.channels.len() > 1 {
-                match flag_contradictions(view, options)? {
-                    Some(flagged) => {
-                        found.add("contradictions_px", flagged);
-                        if view.channels.len() > 2 && options.treatment == MultipathTreatment::Resolve {
-                            found.add("resolved_px", resolve(view, options)?);
-                        }
-                    }
-                    None => found.add("views_not_compared", 1),
-                }
-            }
-            found.add("at_risk_px", assess(view, self.rays.directions(), options)?);
+        if !matches!(view.data, ViewData::Range(_)) {
+            return Err(Error::Needs { stage: "Multipath", needs: "Unwrap" });
         }
+        if view.channels.len() > 1 {
+            match flag_contradictions(view, options)? {
+                Some(flagged) => {
+                    found.add("contradictions_px", flagged);
+                    if view.channels.len() > 2 && options.treatment == MultipathTreatment::Resolve {
+                        found.add("resolved_px", resolve(view, options)?);
+                    }
+                }
+                None => found.add("views_not_compared", 1),
+            }
+        }
+        found.add("at_risk_px", assess(view, self.rays.directions(), options)?);
         Ok(())
     }
 }

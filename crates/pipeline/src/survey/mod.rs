@@ -8,7 +8,6 @@ pub(crate) mod open;
 pub mod plausibility;
 pub(crate) mod records;
 pub(crate) mod span;
-pub(crate) mod thinning;
 pub(crate) mod truth;
 pub(crate) mod view;
 

@@ -72,6 +72,14 @@ impl SpanTally {
         }
     }
 
+    /// Adds what was found in another frame.
+    pub(crate) fn join(&mut self, other: &Self) {
+        self.measured += other.measured;
+        self.outside += other.outside;
+        other.range_m.into_iter().flatten().for_each(|end| widen(&mut self.range_m, end));
+        other.amplitude.into_iter().flatten().for_each(|end| widen(&mut self.amplitude, end));
+    }
+
     /// Writes it, or adds what was found in another part of the survey.
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
         for count in [&mut self.measured, &mut self.outside] {

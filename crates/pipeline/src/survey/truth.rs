@@ -3,9 +3,8 @@
 use nalgebra::Isometry3;
 use range_image::{Flags, Modulation, Raster};
 use serde::Serialize;
-use statistics::quantile;
+use statistics::{Thinning, quantile};
 
-use crate::survey::thinning::Thinning;
 use crate::survey::view::View;
 use commands::Tape;
 
@@ -103,7 +102,7 @@ impl TruthTally {
             }
         }
         let usable = |pixel: &usize| flags[*pixel].is_empty() && all[*pixel].is_finite();
-        let taken = thinning.pixels(self.views, all.len()).filter(usable);
+        let taken = thinning.indices(self.views, all.len()).filter(usable);
         self.errors.extend(taken.map(|pixel| all[pixel].abs()));
         self.views += 1;
     }

@@ -1,9 +1,9 @@
-//! The frames of a survey in the order of time, one in memory at a time.
+//! The frames of a survey in the order of time, a few in memory at a time.
 
-use projective_registration::Projection;
 use std::path::Path;
 use std::sync::Arc;
 
+use camera_model::OrganisedCloud;
 use commands::memory::{FrameBytes, Memory, Work};
 use commands::plan::DriftTreatment;
 use commands::{Doubt, Progress, root_of};
@@ -12,7 +12,9 @@ use pipeline::stages::{Line, Step, Watch};
 use pipeline::stations::projection;
 use pipeline::survey::{FrameWatch, OpenSurvey, Purpose, SenseVotes, StoredWatch, View, open, read_calibration};
 use pipeline::{Error, Result, Stage};
+use projective_registration::Projection;
 use range_io::survey::Survey;
+use rayon::prelude::*;
 use tracking::TrackerOptions;
 
 use crate::register::input::stages;
@@ -32,6 +34,8 @@ pub(crate) struct FrameSource {
     line: Line,
     /// Positions in the survey, in the order of time.
     pub(crate) order: Vec<usize>,
+    /// Frames that are brought to points at the same time.
+    pub(crate) at_once: usize,
     watch: FrameWatch,
     votes: SenseVotes,
     stored: StoredWatch,
@@ -43,24 +47,39 @@ pub(crate) struct PointFrame {
     pub(crate) sigma: Option<Vec<f32>>,
 }
 
+impl PointFrame {
+    fn new(cloud: OrganisedCloud) -> Self {
+        let mut points = cloud.points;
+        for (point, flags) in points.iter_mut().zip(&cloud.flags) {
+            if !flags.is_empty() {
+                *point = [f64::NAN; 3];
+            }
+        }
+        let known = cloud.sigma.iter().any(|sigma| *sigma > 0.0);
+        Self { points, sigma: known.then_some(cloud.sigma) }
+    }
+}
+
 impl FrameSource {
     pub(crate) fn new(path: &Path, calibration: Option<&Path>) -> Result<Self> {
         let correction = Purpose::Ranges(DriftTreatment::Apply);
         let survey = open(path, read_calibration(&root_of(path), calibration)?, correction)?;
         let order = in_order(path, &survey.survey)?;
         let mut stages = stages(survey.survey.level, survey.calibration.as_deref());
-        // Frames of a moving camera are not averaged.
-        stages.retain(|stage| !matches!(stage, Stage::Average(_)));
+        // Frames of a moving camera are neither averaged nor fused.
+        stages.retain(|stage| !matches!(stage, Stage::Average(_) | Stage::FuseExposures(_)));
         let line = Line::new(&stages, &survey)?;
         let bytes = FrameBytes::of(&survey.survey);
         // Keyframes and the map that is made of them; poses and what is said of each frame.
         let keyframes = BYTES_A_PIXEL * bytes.pixels * (TrackerOptions::default().max_keyframes as u64 + 4);
-        let kept = keyframes + BYTES_A_FRAME * order.len() as u64 + bytes.staged;
-        Memory::present().at_once(&Work { what: "tracking frames", kept, each: bytes.read, most: 1 })?;
+        let kept = keyframes + BYTES_A_FRAME * order.len() as u64;
+        let (each, most) = (bytes.read + bytes.staged, rayon::current_num_threads());
+        let at_once = Memory::present().at_once(&Work { what: "tracking frames", kept, each, most })?;
         Ok(Self {
             survey,
             line,
             order,
+            at_once,
             watch: FrameWatch::of_stream(),
             votes: SenseVotes::default(),
             stored: StoredWatch::default(),
@@ -93,27 +112,28 @@ impl FrameSource {
         self.survey.true_pose(station)
     }
 
-    /// Frame `index` of the survey; a frame that shows nothing has only NaN.
-    pub(crate) fn read(&mut self, index: usize, progress: &dyn Progress) -> Result<PointFrame> {
-        let view = match self.survey.view(index) {
-            Err(Error::File(range_io::Error::NothingMeasured { .. })) => return Ok(self.blank()),
-            view => view?,
-        };
+    /// Frames of the survey, in this order; a frame that shows nothing has only NaN.
+    pub(crate) fn read(&mut self, indices: &[usize], progress: &dyn Progress) -> Result<Vec<PointFrame>> {
+        let views: Vec<Result<View>> = indices.par_iter().map(|&index| self.survey.view(index)).collect();
         progress.frames_in_memory(self.survey.live.count());
-        self.watch.look(&view);
-        self.stored.look(&self.survey, &view);
-        let mut views = vec![view];
-        let mut sense = Sense { votes: &mut self.votes, votes_now: index.is_multiple_of(SENSE_EVERY) };
-        self.line.apply(&mut views, &mut sense)?;
-        let Some(cloud) = views.pop().and_then(|view| view.cloud) else { return Ok(self.blank()) };
-        let mut points = cloud.points;
-        for (point, flags) in points.iter_mut().zip(&cloud.flags) {
-            if !flags.is_empty() {
-                *point = [f64::NAN; 3];
+        let mut shown = Vec::with_capacity(views.len());
+        for view in views {
+            match view {
+                Err(Error::File(range_io::Error::NothingMeasured { .. })) => {}
+                view => shown.push(view?),
             }
         }
-        let known = cloud.sigma.iter().any(|sigma| *sigma > 0.0);
-        Ok(PointFrame { points, sigma: known.then_some(cloud.sigma) })
+        for view in &shown {
+            self.watch.look(view);
+            self.stored.look(&self.survey, view);
+        }
+        self.line.apply(&mut shown, &mut Sense { votes: &mut self.votes })?;
+        let mut shown = shown.into_iter().peekable();
+        let frame = |&index: &usize| {
+            let view = shown.next_if(|view| view.frames == [index]);
+            view.and_then(|view| view.cloud).map_or_else(|| self.blank(), PointFrame::new)
+        };
+        Ok(indices.iter().map(frame).collect())
     }
 
     /// What speaks against the frames that were read.
@@ -141,15 +161,13 @@ impl FrameSource {
 /// Judges phases before they are unwrapped.
 struct Sense<'a> {
     votes: &'a mut SenseVotes,
-    votes_now: bool,
 }
 
 impl Watch for Sense<'_> {
     fn before(&mut self, _: usize, stage: &Stage, views: &[View]) {
-        if self.votes_now && matches!(stage, Stage::Unwrap(_)) {
-            for view in views {
-                self.votes.look_at(view);
-            }
+        if matches!(stage, Stage::Unwrap(_)) {
+            let some = |view: &&View| view.frames.iter().any(|index| index.is_multiple_of(SENSE_EVERY));
+            views.iter().filter(some).for_each(|view| self.votes.look_at(view));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! From the request to the written results.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 use atomic_output::Destination;
@@ -9,11 +10,12 @@ use nalgebra::Isometry3;
 use pipeline::survey::plausibility;
 use pipeline::{Error, Result};
 use point_cloud::Cloud;
+use projective_registration::Projection;
 use statistics::quantile;
 use tracking::{TrackedPose, Tracker, TrackerOptions, TrackingState};
 
 use crate::register::input::is_survey;
-use crate::track::frames::FrameSource;
+use crate::track::frames::{FrameSource, PointFrame};
 use crate::track::imu::Inertial;
 use crate::track::outcome::{FramePose, Tracked, TrackedFrame, reason, state, station_pose};
 use crate::track::start::Start;
@@ -67,6 +69,8 @@ fn track_into(destination: &Destination, request: &TrackRequest, progress: &dyn 
 /// A sequence on its way.
 struct Run {
     source: FrameSource,
+    /// How points fall on the camera's pixels.
+    projection: Arc<Projection>,
     start: Start,
     inertial: Option<Inertial>,
     /// The tracker, once a frame has shown surfaces.
@@ -80,27 +84,33 @@ struct Run {
 
 impl Run {
     fn new(source: FrameSource, start: Start, inertial: Option<Inertial>) -> Result<Self> {
-        source.projection()?;
+        let projection = source.projection()?;
         let names = names(&source);
         let (poses, frames, datum) = (Vec::new(), Vec::new(), String::new());
-        Ok(Self { source, start, inertial, tracker: None, datum, has_pose: false, poses, frames, names })
+        Ok(Self { source, projection, start, inertial, tracker: None, datum, has_pose: false, poses, frames, names })
     }
 
     fn all(&mut self, progress: &dyn Progress) -> Result<()> {
         let order = self.source.order.clone();
         progress.begin("track frames", order.len());
-        for (done, index) in order.into_iter().enumerate() {
-            self.frame(index, progress)?;
-            progress.advance(done + 1);
+        let mut done = 0;
+        for indices in order.chunks(self.source.at_once) {
+            let clock = Instant::now();
+            let frames = self.source.read(indices, progress)?;
+            let each_ms = ms(clock) / frames.len() as f64;
+            for (&index, frame) in indices.iter().zip(&frames) {
+                self.frame(index, frame, each_ms)?;
+                done += 1;
+                progress.advance(done);
+            }
         }
         Ok(())
     }
 
-    fn frame(&mut self, index: usize, progress: &dyn Progress) -> Result<()> {
-        let clock = Instant::now();
+    /// Tracks by a frame that took so long to be brought to points, millisecond.
+    fn frame(&mut self, index: usize, read: &PointFrame, points_ms: f64) -> Result<()> {
         let entry = &self.source.survey().frames[index];
         let (station, timestamp_s) = (entry.station.clone(), entry.timestamp_s.unwrap_or_default());
-        let read = self.source.read(index, progress)?;
         let tracking = Instant::now();
         let fail = |error: tracking::Error| Error::registration(&format!("frame {station} at {timestamp_s} s"), &error);
         let before = self.tracker.as_ref().map_or(0, Tracker::keyframes);
@@ -111,7 +121,7 @@ impl Run {
             let world_from_first = self.start.pose(&self.source, &station, timestamp_s);
             let known = world_from_first.unwrap_or_default();
             let options = TrackerOptions { world_from_first: known, ..TrackerOptions::default() };
-            let mut tracker = Tracker::new(&self.source.projection()?, options).map_err(fail)?;
+            let mut tracker = Tracker::new(&self.projection, options).map_err(fail)?;
             let pose = tracker.track(timestamp_s, &read.points, read.sigma.as_deref(), None).map_err(fail)?;
             // A blank frame starts nothing: the next one may.
             if pose.state == TrackingState::Started {
@@ -126,9 +136,9 @@ impl Run {
             inertial.learn(&pose)?;
         }
         let after = self.tracker.as_ref().map_or(0, Tracker::keyframes);
-        let ms = |from: Instant| 1e3 * commands::made::seconds_since(from);
         let became_keyframe = after > before;
-        let times = [ms(tracking), ms(clock)];
+        let track_ms = ms(tracking);
+        let times = [track_ms, points_ms + track_ms];
         let name = std::mem::take(&mut self.names[index]);
         self.frames.push(row(name, index, &pose, became_keyframe, times));
         self.poses.push(FramePose::new(&pose, self.tracker.is_some()));
@@ -166,6 +176,10 @@ impl Run {
         let vertical_axis = if self.has_pose { 2 } else { 1 };
         Ok(Tracked { poses: self.poses, map: tracker.map(), vertical_axis, summary })
     }
+}
+
+fn ms(from: Instant) -> f64 {
+    1e3 * commands::made::seconds_since(from)
 }
 
 /// Frames that the surfaces do not hold, against how far the scene extends.

@@ -4,7 +4,6 @@ use std::fs::{read_to_string, write};
 use std::path::Path;
 use std::process::Command;
 
-use super::FRAMES;
 use crate::shell::{Outcome, root};
 
 /// Stages up to the cloud.
@@ -19,27 +18,63 @@ pub(super) struct Surveys<'a> {
 /// Cameras of the fixtures' scenes, and frames of a station.
 const SMALL: &str = "width: 66, height: 54, pixel_pitch_mm: (0.1, 0.1)";
 const ROOM: &str = "width: 176, height: 144, pixel_pitch_mm: (0.04, 0.04)";
+const FEW: &str = "width: 16, height: 12, pixel_pitch_mm: (0.1, 0.1)";
 const SIX: &str = "frames_per_station: 6";
 const TEN: &str = "frames_per_station: 10";
+/// Frames of a warming camera, over an hour; each is named again where more are asked for.
+const WARMING: usize = 1000;
 /// Frames of a round through the room.
 const ROUND: usize = 72;
 
+/// Which station and which of its frames a frame is, and as what station.
+type Named = Box<dyn Fn(usize) -> (usize, usize, usize)>;
+
 impl Surveys<'_> {
-    /// Those of 640 x 480 pixels.
-    pub(super) fn write(&self) -> Outcome {
-        let large = "width: 640, height: 480, pixel_pitch_mm: (0.0105, 0.0105)";
-        self.simulate("repeats", &[(SMALL, large), (SIX, TEN)], "walls")?;
-        self.simulate("repeats", &[(SMALL, ROOM), (SIX, TEN)], "small")?;
-        let large = (ROOM, "width: 640, height: 480, pixel_pitch_mm: (0.011, 0.011)");
-        self.simulate("room", &[large], "room")?;
-        self.simulate_round(large, "round")?;
-        // Six walls with ten frames each; eight stations in the room with eight.
-        self.long("one station of 2,000", "walls", FRAMES, one_station)?;
-        self.long("200 stations of 10", "walls", FRAMES, stations_of_ten)?;
-        self.long("2,000 stations of one, 176x144", "small", FRAMES, stations_of_one)?;
-        self.long("40 stations of one, a room", "room", 40, |frame| (frame % 8, frame / 8 % 8, frame))?;
-        self.long("a path of 2,000", "round", FRAMES, path)?;
-        Ok(())
+    /// A survey of so many frames of 640x480, or of the size that its kind states. Its name.
+    pub(super) fn large(&self, kind: &str, frames: usize) -> Result<String, String> {
+        let name = format!("{kind} ({frames} large ones)");
+        if self.folder.join(&name).exists() {
+            return Ok(name);
+        }
+        let distinct = frames.min(WARMING);
+        let (of, named): (&str, Named) = match kind {
+            "one station" => ("walls", Box::new(one_station)),
+            "stations of 10" => ("walls", Box::new(stations_of_ten)),
+            "stations of one, 176x144" => ("walls of 176x144", Box::new(stations_of_one)),
+            "stations in a room" => ("room", Box::new(|frame| (frame % 8, frame / 8 % 8, frame))),
+            // Five in turn: the noise is told by the differences of successive frames.
+            "a warming camera" => {
+                ("warming", Box::new(move |frame| (0, frame * distinct / frames / 5 * 5 + frame % 5, 0)))
+            }
+            _ => ("round", Box::new(path)),
+        };
+        if !self.folder.join(of).exists() {
+            self.simulate_large(of, distinct)?;
+        }
+        self.long(&name, of, frames, named)?;
+        Ok(name)
+    }
+
+    /// What frames of 640x480 are named from; so many of a warming camera.
+    fn simulate_large(&self, name: &str, warming: usize) -> Outcome {
+        let walls = "width: 640, height: 480, pixel_pitch_mm: (0.0105, 0.0105)";
+        let room = (ROOM, "width: 640, height: 480, pixel_pitch_mm: (0.011, 0.011)");
+        match name {
+            "walls" => self.simulate("repeats", &[(SMALL, walls), (SIX, TEN)], name),
+            "walls of 176x144" => self.simulate("repeats", &[(SMALL, ROOM), (SIX, TEN)], name),
+            "room" => self.simulate("room", &[room], name),
+            "round" => self.simulate_round(room, name),
+            _ => {
+                let wall = "width: 640, height: 480, pixel_pitch_mm: (0.0025, 0.0025)";
+                let number = format!("frames_per_station: {warming}");
+                let often = format!("frame_interval_s: {}", 3600.0 / warming as f64);
+                let noise = "dark_sigma: 25.0),";
+                let digitised = format!("{noise} digitisation: (sample_type: U16, raw_scale: 2.5),");
+                let often = ("frame_interval_s: 12.0", often.as_str());
+                let number = ("frames_per_station: 300", number.as_str());
+                self.simulate("warm_up", &[(FEW, wall), number, often, (noise, &digitised)], name)
+            }
+        }
     }
 
     /// What those of small frames are made of.

@@ -71,8 +71,10 @@ impl CorrectRange {
             _ => Ok(None),
         }
     }
+}
 
-    fn correct(&self, view: &mut View, found: &mut Found) -> Result<()> {
+impl ViewStage for CorrectRange {
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()> {
         let name = view.name();
         let mut models = models_of(&self.set, view, self.drifts)?;
         let drift = self.drift(view, &models)?;
@@ -96,12 +98,6 @@ impl CorrectRange {
         }
         view.correction = Some(record);
         view.combine_channels()
-    }
-}
-
-impl ViewStage for CorrectRange {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
-        views.iter_mut().try_for_each(|view| self.correct(view, found))
     }
 
     fn findings(&self, found: &Found) -> Findings {

@@ -33,26 +33,24 @@ impl Repair {
 }
 
 impl ViewStage for Repair {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()> {
         let options = &self.options;
-        for view in views {
-            let interval_m = interval(view, options)?;
-            let maximum_wraps = (options.maximum_range_m / interval_m).floor().clamp(0.0, f64::from(u16::MAX)) as u16;
-            let standard = RepairOptions::default();
-            let spatial = SpatialOptions {
-                maximum_wraps,
-                minimum_confidence: options.minimum_confidence as f32,
-                geometry: Some(self.geometry),
-                ..standard.spatial
-            };
-            let amplitude_kind = options.amplitudes.into();
-            let repaired = repair(view, interval_m, &RepairOptions { spatial, amplitude_kind, ..standard })?;
-            found.add("repaired_px", repaired.added);
-            found.add("unsure_px", repaired.unsure);
-            if repaired.unjudged > 0 {
-                found.add(UNJUDGED_VIEWS, 1);
-                found.add("unjudged_px", repaired.unjudged);
-            }
+        let interval_m = interval(view, options)?;
+        let maximum_wraps = (options.maximum_range_m / interval_m).floor().clamp(0.0, f64::from(u16::MAX)) as u16;
+        let standard = RepairOptions::default();
+        let spatial = SpatialOptions {
+            maximum_wraps,
+            minimum_confidence: options.minimum_confidence as f32,
+            geometry: Some(self.geometry),
+            ..standard.spatial
+        };
+        let amplitude_kind = options.amplitudes.into();
+        let repaired = repair(view, interval_m, &RepairOptions { spatial, amplitude_kind, ..standard })?;
+        found.add("repaired_px", repaired.added);
+        found.add("unsure_px", repaired.unsure);
+        if repaired.unjudged > 0 {
+            found.add(UNJUDGED_VIEWS, 1);
+            found.add("unjudged_px", repaired.unjudged);
         }
         Ok(())
     }

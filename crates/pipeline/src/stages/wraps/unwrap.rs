@@ -1,7 +1,9 @@
+use std::sync::{Mutex, PoisonError};
+
 use camera_model::Camera;
 use phase_unwrap::{
-    ImageGeometry, MultiFrequencyOptions, NoisyOptions, PhaseNoise, SpatialOptions, Unwrapped, combined_interval_m,
-    unwrap_multi_frequency, unwrap_noisy_absolute, unwrap_spatial,
+    ImageGeometry, KnownWraps, MultiFrequencyOptions, NoisyOptions, PhaseNoise, SpatialOptions, Unwrapped, Unwrapper,
+    combined_interval_m, unwrap_multi_frequency, unwrap_noisy_absolute,
 };
 use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
 use statistics::quantile;
@@ -26,6 +28,8 @@ const SYSTEMATIC_M: f64 = 0.02;
 pub(crate) struct Unwrap {
     options: UnwrapOptions,
     geometry: ImageGeometry,
+    /// Of the last images: as many as there were at the same time.
+    unwrappers: Mutex<Vec<Unwrapper>>,
 }
 
 impl Unwrap {
@@ -33,86 +37,90 @@ impl Unwrap {
         Self {
             options: options.clone(),
             geometry: image_geometry(&making.survey.calibrated_camera.unwrap_or(making.camera)),
+            unwrappers: Mutex::default(),
         }
+    }
+
+    /// Whole ambiguity intervals of each frequency, and the confidence in them.
+    fn wrap_counts(&self, frame: &ComplexFrame, name: &str) -> Result<(Vec<Raster<i32>>, Raster<f32>)> {
+        let mask = frame.flags.map(|flags| !flags.contains(Flags::NO_DATA));
+        let furthest_m = self.options.maximum_range_m;
+        let fail = |error| Error::stage("Unwrap", name)(error);
+        if let [channel] = frame.channels.as_slice() {
+            let interval = channel.modulation.ambiguity_interval_m();
+            let maximum_wraps = (furthest_m.unwrap_or(FURTHEST_M) / interval).floor().max(0.0) as u16;
+            let mut sigmas: Vec<f64> = channel.sigma.as_slice().iter().map(|sigma| f64::from(*sigma)).collect();
+            let noise = Some(quantile(&mut sigmas, 0.5) as f32).filter(|noise| noise.is_finite());
+            let geometry = Some(self.geometry);
+            let spatial = SpatialOptions { maximum_wraps, amplitude_noise: noise, geometry, ..Default::default() };
+            let unwrapped = match self.options.method {
+                UnwrapMethod::Tree => self.by_tree(channel, &mask, spatial),
+                method => by_noise(channel, &mask, method, spatial),
+            };
+            let unwrapped = unwrapped.map_err(fail)?;
+            return Ok((vec![unwrapped.wraps], unwrapped.confidence));
+        }
+        let phases: Vec<_> = frame.channels.iter().map(ComplexChannel::phase).collect();
+        let sigmas: Vec<_> = frame.channels.iter().map(sigma_with_systematics).collect();
+        let modulations: Vec<_> = frame.channels.iter().map(|channel| channel.modulation).collect();
+        let maximum_range_m = match furthest_m {
+            Some(maximum_m) => maximum_m,
+            None => combined_interval_m(&modulations).map_err(fail)?.min(FURTHEST_M),
+        };
+        let multi = MultiFrequencyOptions { maximum_range_m: Some(maximum_range_m), ..Default::default() };
+        let unwrapped = unwrap_multi_frequency(&phases, &modulations, Some(&sigmas), Some(&mask), &multi);
+        let unwrapped = unwrapped.map_err(fail)?;
+        Ok((unwrapped.wraps, unwrapped.confidence))
+    }
+
+    /// Absolute counts of one frequency. The tree needs no noise.
+    fn by_tree(
+        &self,
+        channel: &ComplexChannel,
+        mask: &Raster<bool>,
+        spatial: SpatialOptions,
+    ) -> std::result::Result<Unwrapped, phase_unwrap::Error> {
+        spatial.validate()?;
+        let unwrappers = || self.unwrappers.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut own = unwrappers().pop().unwrap_or_default();
+        own.set_options(spatial);
+        let unwrapped = own.unwrap(&channel.phase(), Some(&channel.amplitude()), Some(mask), KnownWraps::Nothing)?;
+        unwrappers().push(own);
+        Ok(unwrapped)
     }
 }
 
 impl ViewStage for Unwrap {
-    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
-        for view in views {
-            unwrap_view(view, self.geometry, &self.options)?;
-            found.add("views", 1);
-        }
-        Ok(())
-    }
-}
-
-fn unwrap_view(view: &mut View, geometry: ImageGeometry, options: &UnwrapOptions) -> Result<()> {
-    let name = view.name();
-    let ViewData::Phase(frame) = &view.data else {
-        return Err(Error::Needs { stage: "Unwrap", needs: "Demodulate" });
-    };
-    let (wraps, confidence) = wrap_counts(frame, geometry, options, &name)?;
-    let mut channels: Vec<RangeFrame> =
-        frame.channels.iter().zip(&wraps).map(|(channel, wraps)| channel_range(channel, wraps, &frame.flags)).collect();
-    for channel in &mut channels {
-        for (flags, confidence) in channel.flags.as_mut_slice().iter_mut().zip(confidence.as_slice()) {
-            if confidence.is_nan() || f64::from(*confidence) < options.minimum_confidence {
-                flags.insert(Flags::UNWRAP_UNSURE);
+    fn apply(&self, view: &mut View, found: &mut Found) -> Result<()> {
+        let name = view.name();
+        let ViewData::Phase(frame) = &view.data else {
+            return Err(Error::Needs { stage: "Unwrap", needs: "Demodulate" });
+        };
+        let (wraps, confidence) = self.wrap_counts(frame, &name)?;
+        let channels = frame.channels.iter().zip(&wraps);
+        let mut channels: Vec<RangeFrame> =
+            channels.map(|(channel, wraps)| channel_range(channel, wraps, &frame.flags)).collect();
+        for channel in &mut channels {
+            for (flags, confidence) in channel.flags.as_mut_slice().iter_mut().zip(confidence.as_slice()) {
+                if confidence.is_nan() || f64::from(*confidence) < self.options.minimum_confidence {
+                    flags.insert(Flags::UNWRAP_UNSURE);
+                }
             }
         }
+        found.add("views", 1);
+        view.set_channels(channels)
     }
-    view.set_channels(channels)
 }
 
-/// Whole ambiguity intervals of each frequency, and the confidence in them.
-fn wrap_counts(
-    frame: &ComplexFrame,
-    geometry: ImageGeometry,
-    options: &UnwrapOptions,
-    name: &str,
-) -> Result<(Vec<Raster<i32>>, Raster<f32>)> {
-    let mask = frame.flags.map(|flags| !flags.contains(Flags::NO_DATA));
-    if let [channel] = frame.channels.as_slice() {
-        let interval = channel.modulation.ambiguity_interval_m();
-        let maximum_wraps = (options.maximum_range_m.unwrap_or(FURTHEST_M) / interval).floor().max(0.0) as u16;
-        let mut sigmas: Vec<f64> = channel.sigma.as_slice().iter().map(|sigma| f64::from(*sigma)).collect();
-        let noise = Some(quantile(&mut sigmas, 0.5) as f32).filter(|noise| noise.is_finite());
-        let spatial = SpatialOptions {
-            maximum_wraps,
-            amplitude_noise: noise,
-            geometry: Some(geometry),
-            ..SpatialOptions::default()
-        };
-        let unwrapped = one_frequency(channel, &mask, options.method, spatial).map_err(Error::stage("Unwrap", name))?;
-        return Ok((vec![unwrapped.wraps], unwrapped.confidence));
-    }
-    let phases: Vec<_> = frame.channels.iter().map(ComplexChannel::phase).collect();
-    let sigmas: Vec<_> = frame.channels.iter().map(sigma_with_systematics).collect();
-    let modulations: Vec<_> = frame.channels.iter().map(|channel| channel.modulation).collect();
-    let maximum_range_m = match options.maximum_range_m {
-        Some(maximum_m) => maximum_m,
-        None => combined_interval_m(&modulations).map_err(Error::stage("Unwrap", name))?.min(FURTHEST_M),
-    };
-    let multi = MultiFrequencyOptions { maximum_range_m: Some(maximum_range_m), ..Default::default() };
-    let unwrapped = unwrap_multi_frequency(&phases, &modulations, Some(&sigmas), Some(&mask), &multi);
-    let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
-    Ok((unwrapped.wraps, unwrapped.confidence))
-}
-
-/// Absolute counts of one frequency. The tree needs no noise; what filters takes each pixel's, or its scale from the image
-/// where the raw samples say nothing of it.
-fn one_frequency(
+/// Absolute counts of one frequency by what filters: that takes each pixel's noise, or its scale from the image where the raw
+/// samples say nothing of it.
+fn by_noise(
     channel: &ComplexChannel,
     mask: &Raster<bool>,
     method: UnwrapMethod,
     spatial: SpatialOptions,
 ) -> std::result::Result<Unwrapped, phase_unwrap::Error> {
-    let (phase, amplitude) = (channel.phase(), channel.amplitude());
-    if method == UnwrapMethod::Tree {
-        return unwrap_spatial(&phase, Some(&amplitude), Some(mask), &spatial);
-    }
-    let sigma = channel.sigma_phase();
+    let (phase, amplitude, sigma) = (channel.phase(), channel.amplitude(), channel.sigma_phase());
     let known = sigma.as_slice().iter().any(|sigma| sigma.is_finite());
     let noise = if known { PhaseNoise::Sigma(&sigma) } else { PhaseNoise::Amplitude(&amplitude) };
     let options = NoisyOptions { method: method.into(), spatial, ..NoisyOptions::default() };

@@ -256,8 +256,9 @@ impl Stream<'_> {
     fn next(&mut self) -> Result<View> {
         if self.read.is_empty() {
             let indices: Vec<usize> = self.waiting.by_ref().take(self.at_once).collect();
-            let views = indices.into_par_iter().map(|index| self.survey.view(index));
-            self.read = views.collect::<Result<VecDeque<View>>>()?;
+            let views = indices.into_par_iter().map(|index| self.survey.view(index)).collect::<Vec<Result<View>>>();
+            // Of several errors the first, whichever was read first.
+            self.read = views.into_iter().collect::<Result<VecDeque<View>>>()?;
             self.progress.frames_in_memory(self.survey.live.count());
             for view in &self.read {
                 self.looked.look(view);

@@ -110,10 +110,10 @@ impl<F: Send> Frames<F> for Station<'_, F> {
                 let live = view.live.clone();
                 Ok((make(view)?, live))
             });
-            let read = read.collect::<Result<Vec<(F, LiveFrames)>, Failed>>()?;
+            let read: Vec<Result<(F, LiveFrames), Failed>> = read.collect();
             self.all.progress.frames_in_memory(survey.live.count());
-            for (frame, _) in read {
-                see(&frame)?;
+            for frame in read {
+                see(&frame?.0)?;
                 self.all.advance();
             }
         }

@@ -41,7 +41,9 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
         progress.advance(done.fetch_add(1, Ordering::Relaxed) + 1);
         aligned
     };
-    let aligned = (1..stations.len()).into_par_iter().map(align).collect::<Result<Vec<_>>>()?;
+    let aligned = (1..stations.len()).into_par_iter().map(align).collect::<Vec<Result<_>>>();
+    // Of several errors the first, whichever was found first.
+    let aligned = aligned.into_iter().collect::<Result<Vec<_>>>()?;
     let steps: Vec<IcpResult> = aligned.iter().map(|pair| pair.result.clone()).collect();
     let poses = chain::along(stations[0].approximate.unwrap_or_default(), &steps);
     let before: Option<Vec<_>> = stations.iter().map(|station| station.approximate).collect();

@@ -137,8 +137,9 @@ impl Gathered {
             let names = format!("{} onto {}", self.names[source], self.names[target]);
             Ok(PairAlignment { target, source, result: result.map_err(Error::stage("Register", &names))? })
         };
-        let pairs = (0..surfaces.len() - 1).into_par_iter().map(align).collect::<Result<Vec<_>>>()?;
-        self.pairs.extend(pairs);
+        for pair in (0..surfaces.len() - 1).into_par_iter().map(align).collect::<Vec<Result<_>>>() {
+            self.pairs.push(pair?);
+        }
         self.last = surfaces.into_iter().next_back();
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
 use statistics::{Thinning, quantile};
 
 use crate::Result;
@@ -138,7 +139,7 @@ impl Watch for Tally {
         if is_mean {
             self.last.clear();
         } else if !is_known {
-            self.last = views.iter().map(View::snapshot).collect();
+            self.last = views.par_iter().map(View::snapshot).collect();
         }
         let tally = &mut self.stages[number];
         tally.views[0] += views.len();
@@ -158,7 +159,7 @@ impl Watch for Tally {
 
     fn after(&mut self, number: usize, stage: &Stage, views: &[View]) {
         self.stages[number].seconds += self.clock.elapsed().as_secs_f64();
-        let now: Vec<Option<Snapshot>> = views.iter().map(View::snapshot).collect();
+        let now: Vec<Option<Snapshot>> = views.par_iter().map(View::snapshot).collect();
         self.compare(number, views, &now);
         let tally = &mut self.stages[number];
         for (view, snapshot) in views.iter().zip(&now) {

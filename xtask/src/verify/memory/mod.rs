@@ -82,7 +82,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         beyond.extend(growth::run(&surveys, options.frames, &options.only)?);
     }
     if !options.small {
-        println!("{:<32} {:<20} {:>10} {:>12}  exit code", "survey of 640x480", "command", "most, MB", "processor, s");
+        println!("{:<40} {:<20} {:>10} {:>12}  exit code", "survey of 640x480", "command", "most, MB", "processor, s");
         let asked: Vec<&Case> = CASES.iter().filter(|case| case.name().contains(&options.only)).collect();
         if asked.is_empty() {
             let names: Vec<String> = CASES.iter().map(Case::name).collect();
@@ -91,7 +91,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         for case in asked {
             let survey = surveys.large(case.survey, options.large.unwrap_or(FRAMES).min(case.most))?;
             let Taken { most_mb, seconds, code } = measured(&program, folder.path(), case.command, &survey)?;
-            println!("{survey:<32} {:<20} {most_mb:>10} {seconds:>12.1}  {code}", words(case.command));
+            println!("{survey:<40} {:<20} {most_mb:>10} {seconds:>12.1}  {code}", words(case.command));
             if most_mb > MOST_MB {
                 beyond.push(format!("{}: {most_mb} MB", case.name()));
             }

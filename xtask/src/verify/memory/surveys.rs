@@ -32,7 +32,7 @@ type Named = Box<dyn Fn(usize) -> (usize, usize, usize)>;
 impl Surveys<'_> {
     /// A survey of so many frames of 640x480, or of the size that its kind states. Its name.
     pub(super) fn large(&self, kind: &str, frames: usize) -> Result<String, String> {
-        let name = format!("{kind} ({frames} large ones)");
+        let name = format!("{kind} ({frames} frames)");
         if self.folder.join(&name).exists() {
             return Ok(name);
         }

@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use pipeline::{Failure, Plan, RunRequest, Silent};
+use pipeline::stages::Line;
+use pipeline::survey::{Purpose, open};
+use pipeline::{Error, Failure, Plan, RunRequest, Silent, Stage, View, ViewData};
+use range_image::{RangeFrame, Raster};
 use range_io::npz::NpzWriter;
 
 use crate::common::{fixtures, request};
@@ -87,6 +90,32 @@ fn a_truncated_archive_names_the_file() {
     std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
     std::fs::remove_dir_all(folder.path().join("out")).unwrap();
     assert_says(&run_stages(&folder.path().join("survey"), "Demodulate()"), &["0.npz"]);
+}
+
+/// As it would be if frames came one by one, however many of them go through the stages at the same time.
+#[test]
+fn of_several_errors_that_of_the_first_frame_is_told() {
+    let (folder, outcome) = attempt(SURVEY, &ramp(48), &[1, 4, 3, 4], "Demodulate()");
+    outcome.unwrap();
+    let survey = open(&folder.path().join("survey"), (None, String::new()), Purpose::Camera).unwrap();
+    // Read one by one, as a plan would refuse the order that the test needs.
+    let stage = |text: &&str| {
+        Plan::from_ron(&format!("(name: \"x\", stages: [{text}])"), Path::new("x.ron")).unwrap().stages.remove(0)
+    };
+    let through = |stages: &[&str], views: Vec<pipeline::Result<View>>| {
+        let stages: Vec<Stage> = stages.iter().map(stage).collect();
+        Line::new(&stages, &survey).unwrap().apply(views, &mut ())
+    };
+    let phases = || through(&["Demodulate()"], vec![survey.view(0)]).map(|mut views| views.remove(0));
+    // Its image has another size than the camera, which only the second of the stages below minds.
+    let mut ranges = through(&["Demodulate()", "Unwrap()"], vec![survey.view(0)]).unwrap().remove(0);
+    ranges.data = ViewData::Range(RangeFrame::from_range(Raster::filled(2, 2, 1.0)));
+    let unread = || Err(Error::Camera("it cannot be read".to_owned()));
+    let told =
+        |views: Vec<pipeline::Result<View>>| Err(through(&["Flag()", "PointCloud()"], views).unwrap_err().to_string());
+    assert_says(&told(vec![Ok(ranges), phases(), unread()]), &["PointCloud"]);
+    assert_says(&told(vec![phases(), unread()]), &["Flag"]);
+    assert_says(&told(vec![unread(), phases()]), &["cannot be read"]);
 }
 
 #[test]

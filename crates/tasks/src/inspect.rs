@@ -173,9 +173,7 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
         stored.look(&opened, &view);
         // One frame of a station tells the sense of the phase.
         if survey.level <= Level::Phase && judged.insert(&entry.station) && judged.len() <= MOST_JUDGED {
-            let mut views = vec![view];
-            line.apply(&mut views, &mut ())?;
-            for view in &views {
+            for view in &line.apply(vec![Ok(view)], &mut ())? {
                 votes.look_at(view);
             }
         }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::stages::average::Tests;
-use crate::stages::{Line, Watch};
+use crate::stages::{Line, Watch, up_to_error};
 use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility::{FrameWatch, StoredWatch};
 use crate::survey::view::View;
@@ -155,7 +155,7 @@ struct Stream<'a> {
     watch: &'a mut dyn Watch,
     progress: &'a dyn Progress,
     waiting: std::vec::IntoIter<usize>,
-    read: VecDeque<View>,
+    read: VecDeque<Result<View>>,
     at_once: usize,
     looked: FrameWatch,
     stored: StoredWatch,
@@ -201,15 +201,12 @@ pub fn follow_station(
 impl Stream<'_> {
     fn units(&mut self, units: &[Vec<Group>]) -> Result<Vec<View>> {
         let average = self.line.average();
-        let mut views = Vec::new();
-        for frames in units.iter().flatten() {
-            views.push(match average {
-                Some(number) => self.mean(number, frames)?,
-                None => self.next()?,
-            });
-        }
+        let views = up_to_error(units.iter().flatten().map(|frames| match average {
+            Some(number) => self.mean(number, frames),
+            None => self.next(),
+        }));
         let rest = average.map_or(0, |number| number + 1)..self.line.steps().len();
-        self.line.apply_some(rest, &mut views, self.watch)?;
+        let views = self.line.apply_some(rest, views, self.watch)?;
         if average.is_none() {
             self.done += units.iter().flatten().map(Vec::len).sum::<usize>();
             self.progress.advance(self.done);
@@ -236,8 +233,8 @@ impl Stream<'_> {
             }
         } else {
             for some in frames.chunks(self.at_once) {
-                let mut some = some.iter().map(|_| self.next()).collect::<Result<Vec<View>>>()?;
-                self.line.apply_some(0..number, &mut some, self.watch)?;
+                let some = up_to_error(some.iter().map(|_| self.next()));
+                let some = self.line.apply_some(0..number, some, self.watch)?;
                 self.done += some.len();
                 self.progress.advance(self.done);
                 for view in some {
@@ -257,14 +254,13 @@ impl Stream<'_> {
         if self.read.is_empty() {
             let indices: Vec<usize> = self.waiting.by_ref().take(self.at_once).collect();
             let views = indices.into_par_iter().map(|index| self.survey.view(index)).collect::<Vec<Result<View>>>();
-            // Of several errors the first, whichever was read first.
-            self.read = views.into_iter().collect::<Result<VecDeque<View>>>()?;
+            self.read = VecDeque::from(views);
             self.progress.frames_in_memory(self.survey.live.count());
-            for view in &self.read {
+            for view in self.read.iter().flatten() {
                 self.looked.look(view);
                 self.stored.look(self.survey, view);
             }
         }
-        self.read.pop_front().ok_or_else(|| crate::Error::unfit("read frames", "the survey", "no frame"))
+        self.read.pop_front().unwrap_or_else(|| Err(crate::Error::unfit("read frames", "the survey", "no frame")))
     }
 }

@@ -110,33 +110,38 @@ impl Line {
         self.steps.iter().position(|step| matches!(step.work, Work::Mean(_)))
     }
 
-    /// Takes views through all stages that there are in a range.
+    /// Takes views through all stages that there are in a range, and the error of a view that would come after them.
     pub(crate) fn apply_some(
         &mut self,
         range: Range<usize>,
-        views: &mut Vec<View>,
+        (mut views, mut failed): (Vec<View>, Result<()>),
         watch: &mut dyn Watch,
-    ) -> Result<()> {
+    ) -> Result<Vec<View>> {
         for number in range {
             let step = &mut self.steps[number];
-            watch.before(number, &step.stage, views);
+            watch.before(number, &step.stage, &views);
             match &step.work {
-                Work::Views(stage) => each(stage.as_ref(), views, &mut step.found)?,
-                Work::Fuse(fuse) => fuse.apply(views, &mut step.found)?,
+                // The error of an earlier view takes the place of a later one's, whichever stage it is in.
+                Work::Views(stage) => failed = each(stage.as_ref(), &mut views, &mut step.found).and(failed),
+                _ if failed.is_err() => break,
+                Work::Fuse(fuse) => fuse.apply(&mut views, &mut step.found)?,
                 Work::Mean(average) => {
-                    let (view, tests) = average.mean(std::mem::take(views))?;
+                    let (view, tests) = average.mean(std::mem::take(&mut views))?;
                     Average::record(&tests, view.frames.len(), &mut step.found);
                     views.push(view);
                 }
             }
-            watch.after(number, &step.stage, views);
+            watch.after(number, &step.stage, &views);
         }
-        Ok(())
+        failed.map(|()| views)
     }
 
     /// Takes views through all stages: those of one station where exposures are fused, or else any.
-    pub fn apply(&mut self, views: &mut Vec<View>, watch: &mut dyn Watch) -> Result<()> {
-        self.apply_some(0..self.steps.len(), views, watch)
+    ///
+    /// # Errors
+    /// That of the first view that has one, be it in reading it or in any stage.
+    pub fn apply(&mut self, views: Vec<Result<View>>, watch: &mut dyn Watch) -> Result<Vec<View>> {
+        self.apply_some(0..self.steps.len(), up_to_error(views), watch)
     }
 
     /// The mean of some frames, or of means of parts of them, by the stage of this number.
@@ -155,14 +160,25 @@ impl Line {
     }
 }
 
-/// Takes views through a stage at the same time; what is found, and the error of the first that has one, are in their order.
-fn each(stage: &dyn ViewStage, views: &mut [View], found: &mut Found) -> Result<()> {
+/// Takes views through a stage at the same time; what is found of them, up to the first error, in their order.
+fn each(stage: &dyn ViewStage, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
     let one = |view: &mut View| {
         let mut own = Found::default();
         stage.apply(view, &mut own).map(|()| own)
     };
-    let all: Vec<Result<Found>> = views.par_iter_mut().map(one).collect();
-    all.into_iter().try_for_each(|own| own.map(|own| found.join(own)))
+    let (done, failed) = up_to_error(views.par_iter_mut().map(one).collect::<Vec<_>>());
+    views.truncate(done.len());
+    for own in done {
+        found.join(own);
+    }
+    failed
+}
+
+/// What comes before the first error, and that error.
+pub(crate) fn up_to_error<T>(some: impl IntoIterator<Item = Result<T>>) -> (Vec<T>, Result<()>) {
+    let mut failed = Ok(());
+    let good = some.into_iter().map_while(|one| one.map_err(|error| failed = Err(error)).ok()).collect();
+    (good, failed)
 }
 
 impl Step {

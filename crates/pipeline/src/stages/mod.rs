@@ -25,6 +25,7 @@ use crate::survey::drift::ViewDrift;
 use crate::survey::span::SpanTally;
 use crate::survey::view::View;
 use commands::{Doubt, Tape};
+pub(crate) use line::up_to_error;
 pub use line::{Line, Step, Watch};
 
 /// Figures that a stage reports, with units in their names.

@@ -114,20 +114,14 @@ impl FrameSource {
 
     /// Frames of the survey, in this order; a frame that shows nothing has only NaN.
     pub(crate) fn read(&mut self, indices: &[usize], progress: &dyn Progress) -> Result<Vec<PointFrame>> {
-        let views: Vec<Result<View>> = indices.par_iter().map(|&index| self.survey.view(index)).collect();
+        let mut shown: Vec<Result<View>> = indices.par_iter().map(|&index| self.survey.view(index)).collect();
         progress.frames_in_memory(self.survey.live.count());
-        let mut shown = Vec::with_capacity(views.len());
-        for view in views {
-            match view {
-                Err(Error::File(range_io::Error::NothingMeasured { .. })) => {}
-                view => shown.push(view?),
-            }
-        }
-        for view in &shown {
+        shown.retain(|view| !matches!(view, Err(Error::File(range_io::Error::NothingMeasured { .. }))));
+        for view in shown.iter().flatten() {
             self.watch.look(view);
             self.stored.look(&self.survey, view);
         }
-        self.line.apply(&mut shown, &mut Sense { votes: &mut self.votes })?;
+        let shown = self.line.apply(shown, &mut Sense { votes: &mut self.votes })?;
         let mut shown = shown.into_iter().peekable();
         let frame = |&index: &usize| {
             let view = shown.next_if(|view| view.frames == [index]);

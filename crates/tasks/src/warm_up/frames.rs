@@ -77,10 +77,8 @@ impl FrameSource {
     /// Some frames, in the order of the survey.
     pub(crate) fn read(&mut self, indices: Range<usize>, progress: &dyn Progress) -> Result<Vec<RangeFrame>> {
         let views = indices.into_par_iter().map(|index| self.survey.view(index)).collect::<Vec<Result<View>>>();
-        // Of several errors the first, whichever was read first.
-        let mut views = views.into_iter().collect::<Result<Vec<View>>>()?;
         progress.frames_in_memory(self.survey.live.count());
-        self.line.apply(&mut views, &mut ())?;
+        let views = self.line.apply(views, &mut ())?;
         views.into_par_iter().map(range_frame).collect()
     }
 }
